@@ -1,0 +1,1 @@
+"""Calibrate an intensified camera: response, gain, noise, each with its uncertainty."""

@@ -1,0 +1,5 @@
+"""``python -m imclab``."""
+
+from imclab.cli import main
+
+main()

@@ -1,0 +1,87 @@
+"""The ``imclab`` command: the verbs, each a thin layer over a library call.
+
+Exit codes: 0 done; 2 bad input, told in one block on stderr; 3 hardware; 130 interrupted with what
+was finished saved. Only this module prints errors, and only here does the program end.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from typing import Annotated
+
+import click
+import typer
+
+import imclab
+
+app = typer.Typer(
+    name="imclab",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="markdown",
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        print(f"imclab {imclab.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Find out whether the simulation of a range-gated underwater imaging rig can be believed."""
+
+
+def _tell(error: BaseException, code: int) -> int:
+    print(f"imclab: {error}", file=sys.stderr)
+    return code
+
+
+def main() -> None:
+    """Run the command line; the one place that turns errors into exit codes."""
+    sys.exit(run())
+
+
+def run(arguments: list[str] | None = None) -> int:
+    """Run one command and return its exit code.
+
+    Parameters
+    ----------
+    arguments : list of str, optional
+        The words after ``imclab``; those of the process when left out.
+    """
+    try:
+        outcome = app(args=arguments, standalone_mode=False)
+    except click.ClickException as error:
+        error.show()
+        return error.exit_code
+    except (KeyboardInterrupt, click.Abort):
+        return _tell(KeyboardInterrupt("interrupted"), 130)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except OSError as error:
+        if getattr(error, "exit_code", None) is None and error.filename is not None:
+            return _tell(OSError(f"{error.filename}: {error.strerror}"), 2)
+        code = getattr(error, "exit_code", None)
+        if code is None:
+            raise
+        return _tell(error, code)
+    except Exception as error:
+        code = getattr(error, "exit_code", None)
+        if code is None:
+            raise
+        return _tell(error, code)
+    return outcome if isinstance(outcome, int) else 0
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Drive the delay generator that times the gate of an image intensifier."""
