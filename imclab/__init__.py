@@ -1,4 +1,4 @@
-"""imclab: can the simulation of a range-gated underwater imaging rig be believed?
+"""Can the simulation of a range-gated underwater imaging rig be believed? This package finds out.
 
 The names below are loaded when they are first used, so that ``import imclab`` stays light: numba,
 OpenCV and matplotlib are imported only by the work that needs them.
@@ -12,10 +12,8 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from imclab import metrics, optics, registration
     from imclab.result import Flux, Result
     from imclab.scene import Scene, load_scene
-    from imclab.transport import simulate, transmit
 
 __all__ = [
     "Flux",

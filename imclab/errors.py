@@ -54,7 +54,7 @@ class OutputError(ImclabError, OSError):
     """A result could not be written."""
 
 
-class InterruptedRun(ImclabError):
+class InterruptedRunError(ImclabError):
     """The user stopped a run; what was finished has been saved."""
 
     exit_code = 130

@@ -1,0 +1,49 @@
+"""Files are written whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from imclab.errors import Fault, InputError, OutputError
+
+
+@contextmanager
+def written_whole(path: str | Path) -> Iterator[Path]:
+    """Give a temporary name beside ``path``; rename it to ``path`` only when the block succeeds.
+
+    Raises
+    ------
+    OutputError
+        When the folder does not exist or may not be written to.
+    """
+    path = Path(path)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.{secrets.token_hex(4)}.part")
+    try:
+        yield temporary
+        temporary.replace(path)
+    except OSError as error:
+        raise OutputError(
+            f"{path}: cannot be written ({error.strerror or error}). "
+            "Name a file in a folder that exists and may be written to."
+        ) from error
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def empty_folder(path: str | Path) -> Path:
+    """Make ``path`` if need be and return it; refuse one that holds something already."""
+    folder = Path(path)
+    try:
+        if folder.exists() and not folder.is_dir():
+            raise InputError(str(folder), [Fault("output", "a file", "a folder")])
+        if folder.is_dir() and any(folder.iterdir()):
+            wanted = "a folder that is empty or does not exist"
+            raise InputError(str(folder), [Fault("output", "a folder with files in it", wanted)])
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be made ({error.strerror or error})") from error
+    return folder

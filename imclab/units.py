@@ -1,0 +1,69 @@
+"""Quantities as text at the door, SI floats inside: ``parse("4.5 ns", "time")`` is ``4.5e-09``."""
+
+from __future__ import annotations
+
+import math
+import re
+from decimal import Decimal
+from functools import lru_cache
+from typing import Any
+
+# What each kind of quantity is inside, and an example to show in an error.
+SI_UNIT = {
+    "length": ("m", "5 cm"),
+    "time": ("s", "4.5 ns"),
+    "attenuation": ("1/m", "0.42 1/m"),
+    "angle": ("rad", "200 mrad"),
+    "energy": ("J", "20 uJ"),
+    "frequency": ("1/s", "1 kHz"),
+    "temperature": ("K", "20 degC"),
+    "density": ("kg/m**3", "2.71 g/cm^3"),
+    "number_density": ("1/m**3", "1e12 1/m^3"),
+    "salinity": ("g/kg", "35 g/kg"),
+}
+_BARE_NUMBER = re.compile(r"\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*\Z")
+
+
+class UnitError(ValueError):
+    """A text is no quantity of the wanted kind; the message says what came and what was wanted."""
+
+
+@lru_cache(maxsize=1)
+def _registry() -> Any:
+    import pint
+
+    # Decimal arithmetic: "4.5 ns" becomes the float nearest to 4.5e-9, not one rounding away.
+    return pint.UnitRegistry(autoconvert_offset_to_baseunit=True, non_int_type=Decimal)
+
+
+def parse(text: str, kind: str) -> float:
+    """Return the quantity written in ``text`` in SI units.
+
+    Parameters
+    ----------
+    text : str
+        A number and a unit, such as ``"0.42 1/m"``.
+    kind : str
+        A key of `SI_UNIT`.
+
+    Raises
+    ------
+    UnitError
+        When ``text`` has no unit, an unknown one, or one of another dimension.
+    """
+    unit, example = SI_UNIT[kind]
+    wanted = f'text with a unit of {kind.replace("_", " ")}, for example "{example}"'
+    if not isinstance(text, str) or not text.strip():
+        raise UnitError(f"wanted {wanted}")
+    if _BARE_NUMBER.match(text):
+        raise UnitError(f"a unit is missing; wanted {wanted}")
+    try:
+        quantity = _registry().parse_expression(text.replace("µ", "u").replace("μ", "u"))
+        value = float(quantity.to(unit).magnitude)
+    except Exception as error:  # pint raises many unrelated kinds, tokenizer errors among them
+        raise UnitError(f"wanted {wanted}") from error
+    if kind == "angle" and quantity.unitless and str(quantity.units) == "dimensionless":
+        raise UnitError(f"a unit is missing; wanted {wanted}")
+    if not math.isfinite(value):
+        raise UnitError(f"not finite; wanted {wanted}")
+    return value
