@@ -7,6 +7,7 @@ Axes, origin and signs are those of `docs/conventions.md`.
 from __future__ import annotations
 
 import copy
+import io
 from collections.abc import Mapping
 from functools import cached_property
 from pathlib import Path
@@ -165,6 +166,11 @@ class Scene(Part):
         return tomli_w.dumps(self._document)
 
     @property
+    def document(self) -> dict[str, Any]:
+        """The nested tables the scene was made from, a copy."""
+        return copy.deepcopy(self._document)
+
+    @property
     def folder(self) -> Path:
         """Where the names of files in this scene are looked for."""
         return self._folder
@@ -235,7 +241,7 @@ def _read_mask(path: Path) -> NDArray[np.bool_]:
     from skimage.io import imread
 
     try:
-        picture = np.asarray(imread(path))
+        picture = np.asarray(imread(io.BytesIO(path.read_bytes())))
     except Exception as error:  # each picture format has its own errors for a damaged file
         raise ValueError("not a picture that can be read") from error
     if picture.ndim == 3 and picture.shape[2] in (3, 4):
