@@ -8,12 +8,11 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
 from imclab.optics.phase_table import PhaseTable
+from imclab.transport.scalar_kernel import scalar_kernel
 
 
-@njit(inline="always")
+@scalar_kernel
 def sample(table: PhaseTable, u: float) -> float:
     """Draw ``1 - mu`` from the table.
 
@@ -38,14 +37,16 @@ def sample(table: PhaseTable, u: float) -> float:
     first = fraction < rows[row, 0]
     start = rows[row, 1] if first else rows[row, 3]
     slope = rows[row, 2] if first else rows[row, 4]
-    return min(max(start + slope * fraction, 0.0), 2.0)
+    one_minus_mu: float = start + slope * fraction
+    return min(max(one_minus_mu, 0.0), 2.0)
 
 
-@njit(inline="always")
+@scalar_kernel
 def evaluate(table: PhaseTable, one_minus_mu: float) -> float:
     """Return the phase function in 1/sr at ``1 - mu`` in [0, 2]: the density that `sample` draws from."""
     cells = table.density.shape[0]
     forward = math.sqrt(math.sqrt(one_minus_mu))
     backward = 2.0 - math.sqrt(max(2.0 - one_minus_mu, 0.0))
     twice_t = forward if one_minus_mu < 1.0 else backward
-    return table.density[min(int(0.5 * cells * twice_t), cells - 1)]
+    value: float = table.density[min(int(0.5 * cells * twice_t), cells - 1)]
+    return value

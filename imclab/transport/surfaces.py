@@ -9,16 +9,15 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
 from imclab.optics.surface import DIFFUSE, LAMBERTIAN, Surface
+from imclab.transport.scalar_kernel import scalar_kernel
 
 Direction = tuple[float, float, float]
 
 _BELOW_ONE = 1.0 - 2.0**-53  # u1 may have been rounded up to 1
 
 
-@njit(inline="always")
+@scalar_kernel
 def fresnel(cos_in: float, n: float, k: float) -> float:
     """Return the unpolarised Fresnel reflectance for the relative index n - ik."""
     s2 = (1.0 - cos_in) * (1.0 + cos_in)
@@ -35,7 +34,7 @@ def fresnel(cos_in: float, n: float, k: float) -> float:
     return 0.5 * perpendicular * (1.0 + ratio)
 
 
-@njit(inline="always")
+@scalar_kernel
 def cosine_law_reflectance(surface: Surface, cos_in: float) -> float:
     """Return the directional albedo of a Lambertian surface or of the diffuse law (eq. 11)."""
     if surface.kind == LAMBERTIAN:
@@ -45,14 +44,14 @@ def cosine_law_reflectance(surface: Surface, cos_in: float) -> float:
     return entering * entering * body / max(1.0 - (1.0 - entering) * body, 1e-300)
 
 
-@njit(inline="always")
+@scalar_kernel
 def facet_density(surface: Surface, tan_square: float, cos_normal: float) -> float:
     """Return Beckmann's density of facet normals, 1/sr."""
     square = surface.roughness * surface.roughness
     return math.exp(-tan_square / square) / (math.pi * square * cos_normal**4)
 
 
-@njit
+@scalar_kernel
 def evaluate(surface: Surface, w_in: Direction, w_out: Direction) -> float:
     """Return the BRDF in 1/sr; zero when a direction is not above the surface."""
     cos_in, cos_out = w_in[2], w_out[2]
@@ -70,7 +69,7 @@ def evaluate(surface: Surface, w_in: Direction, w_out: Direction) -> float:
     return reflectance * facets * shadowing / (4.0 * (cos_in * cos_out))
 
 
-@njit
+@scalar_kernel
 def density(surface: Surface, w_in: Direction, w_out: Direction) -> float:
     """Return the density in 1/sr with which `sample` draws ``w_out``."""
     if w_in[2] <= 0.0:
@@ -88,7 +87,7 @@ def density(surface: Surface, w_in: Direction, w_out: Direction) -> float:
     return 2.0 * drawn if 2.0 * cos_normal * w_in[2] < cos_beta else drawn
 
 
-@njit
+@scalar_kernel
 def sample(surface: Surface, w_in: Direction, u1: float, u2: float) -> tuple[Direction, float]:
     """Draw a direction; its weight is ``BRDF cos_out / density``, zero if it is lost.
 
@@ -126,6 +125,6 @@ def sample(surface: Surface, w_in: Direction, u1: float, u2: float) -> tuple[Dir
     if cos_in <= 0.0 or cos_out <= 0.0 or cos_beta <= 0.0:
         return w_out, 0.0
     shadowing = min(1.0, 2.0 * cos_normal * min(cos_in, cos_out) / cos_beta)
-    weight = fresnel(min(cos_beta, 1.0), surface.refractive_index, surface.extinction_index) * shadowing * cos_beta
-    weight /= cos_in * cos_normal
+    reflectance = fresnel(min(cos_beta, 1.0), surface.refractive_index, surface.extinction_index)
+    weight = reflectance * shadowing * cos_beta / (cos_in * cos_normal)
     return w_out, 0.5 * weight if 2.0 * cos_normal * cos_in < cos_beta else weight
