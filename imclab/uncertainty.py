@@ -1,7 +1,8 @@
 """Estimates with their uncertainty budgets, after the GUM and ASME V&V 20-2009.
 
-Every relative quantity here is compared through its comparison error E = simulation / experiment - 1
-and its validation uncertainty u_val, the root sum of squares of the budget's independent parts.
+A source of uncertainty is a table of *effects*: row j holds what one independent unit-variance cause
+does to each condition, as a relative change. Covariance is then effects.T @ effects, and an error
+that many conditions share (a calibration, the reference condition) is shared in the covariance too.
 """
 
 from __future__ import annotations
@@ -10,7 +11,12 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 COVERAGE_95 = 1.959963984540054  # of a normal distribution
+
+Effects = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -36,9 +42,9 @@ class ComparisonError:
     value : float
         E = simulated / measured - 1.
     budget : mapping
-        Relative standard uncertainty of each source; independent of one another.
+        Relative standard uncertainty by source; the sources are independent of one another.
     bound : float
-        The claim to be judged, 0.30 in the paper.
+        The claim to be judged; the paper's is 0.30.
     """
 
     value: float
@@ -62,13 +68,13 @@ class ComparisonError:
         if self.u_val == 0.0:
             return float(abs(self.value) <= self.bound)
         scale = self.u_val * math.sqrt(2.0)
-        above = math.erf((self.bound - self.value) / scale)
-        below = math.erf((-self.bound - self.value) / scale)
-        return 0.5 * (above - below)
+        return 0.5 * (
+            math.erf((self.bound - self.value) / scale) - math.erf((-self.bound - self.value) / scale)
+        )
 
     @property
     def verdict(self) -> str:
-        """What the numbers say, in one of three ways (V&V 20, section 6)."""
+        """What the numbers say, in one of four ways (V&V 20, section 6)."""
         if abs(self.value) <= COVERAGE_95 * self.u_val:
             return "agrees within its uncertainty"
         if self.probability_inside >= 0.95:
@@ -76,3 +82,13 @@ class ComparisonError:
         if self.probability_inside <= 0.05:
             return "differs, outside the bound"
         return "differs, perhaps outside the bound"
+
+
+def covariance(sources: Mapping[str, Effects]) -> NDArray[np.float64]:
+    """Return the covariance (conditions, conditions) of all sources together."""
+    return np.asarray(sum(effects.T @ effects for effects in sources.values()))
+
+
+def budget(sources: Mapping[str, Effects], condition: int) -> dict[str, float]:
+    """Return the standard uncertainty of one condition by source."""
+    return {name: float(np.sqrt((effects[:, condition] ** 2).sum())) for name, effects in sources.items()}
