@@ -1,0 +1,92 @@
+"""Phase functions inside kernels, and how a direction turns.
+
+A scattering is described by its *deviation* ``s = 1 - mu``, which keeps its digits where the cosine
+``mu`` would be rounded to 1. The kind of phase function is the type of what travels in the set-up,
+so each kernel is compiled for the one that its scene has.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from numba import types
+from numba.extending import overload
+
+from imclab.transport import phase_sampling
+from imclab.transport.kernel_cache import device
+
+
+class HenyeyGreensteinLaw(NamedTuple):
+    """Henyey-Greenstein phase function in closed form; ``asymmetry`` 0 is isotropic."""
+
+    asymmetry: float
+
+
+def sample_deviation(phase: Any, u: float) -> float:
+    """Draw a deviation from a phase function with one uniform number in (0, 1)."""
+    raise NotImplementedError("called from kernels only")
+
+
+def phase_density(phase: Any, deviation: float) -> float:
+    """Return the phase function in 1/sr at a deviation."""
+    raise NotImplementedError("called from kernels only")
+
+
+@device
+def henyey_greenstein_deviation(asymmetry: Any, u: Any) -> Any:
+    """Return the deviation that a uniform number stands for.
+
+    The usual formula for the cosine with 1 - mu taken out by algebra: no cancellation near the
+    forward direction, no division by the asymmetry, so it holds from -1 to 1 and through 0. Written
+    without literals so that it keeps the precision of its arguments.
+    """
+    double = u + u
+    d = (asymmetry - asymmetry * double) + (u - u + 1)
+    narrow = 1 - asymmetry
+    return min(narrow * narrow * double * (1 + asymmetry * (1 - u)) / (d * d), u - u + 2)
+
+
+def _is_henyey_greenstein(phase: Any) -> bool:
+    return isinstance(phase, types.NamedTuple) and phase.instance_class is HenyeyGreensteinLaw
+
+
+@overload(sample_deviation, inline="never")
+def _sample_deviation(phase: Any, u: Any) -> Any:
+    if _is_henyey_greenstein(phase):
+        return lambda phase, u: henyey_greenstein_deviation(phase.asymmetry, u)
+    return lambda phase, u: phase_sampling.sample(phase, u)
+
+
+@overload(phase_density, inline="never")
+def _phase_density(phase: Any, deviation: Any) -> Any:
+    if _is_henyey_greenstein(phase):
+        return _henyey_greenstein_density
+    return lambda phase, deviation: phase_sampling.evaluate(phase, deviation)
+
+
+def _henyey_greenstein_density(phase: Any, deviation: Any) -> Any:
+    g = phase.asymmetry
+    square = (1.0 - g) * (1.0 - g) + 2.0 * g * deviation
+    return (1.0 - g) * (1.0 + g) / (4.0 * math.pi * square * math.sqrt(square))
+
+
+@device
+def turn(direction: Any, deviation: Any, sine_azimuth: Any, cosine_azimuth: Any) -> Any:
+    """Return the unit direction at a deviation and an azimuth from a unit direction.
+
+    Eq. 19 divides by sqrt(1 - u_z^2), which is zero along the axis. This basis has no such place and
+    no branch (Duff et al. 2017, "Building an orthonormal basis, revisited", JCGT 6, 1).
+    """
+    x, y, z = direction
+    sign = math.copysign(1.0, z)
+    a = -1.0 / (sign + z)
+    b = x * y * a
+    sine = math.sqrt(deviation * (2.0 - deviation))
+    along, across = sine * cosine_azimuth, sine * sine_azimuth
+    forward = 1.0 - deviation
+    new_x = forward * x + along * (1.0 + sign * x * x * a) + across * b
+    new_y = forward * y + along * sign * b + across * (sign + y * y * a)
+    new_z = forward * z - along * sign * x - across * y
+    scale = 1.0 / math.sqrt(new_x * new_x + new_y * new_y + new_z * new_z)
+    return new_x * scale, new_y * scale, new_z * scale
