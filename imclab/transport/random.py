@@ -15,7 +15,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from llvmlite import ir
+from llvmlite import ir  # type: ignore[import-untyped]
 from numba import types
 from numba.extending import intrinsic
 
@@ -130,11 +130,11 @@ def uniform32(word: Any) -> Any:
 def log32(value: Any) -> Any:
     """Return the natural logarithm of a positive normal float32."""
     bits = _bits_of(value)
-    exponent = np.int32(np.int32(bits >> np.int32(23)) - np.int32(127))
+    exponent = np.float32(np.int32(np.int32(bits >> np.int32(23)) - np.int32(127)))
     mantissa = _float_of(np.int32((bits & np.int32(0x007FFFFF)) | np.int32(0x3F800000)))
     large = mantissa > _SQRT2
     mantissa = mantissa * _HALF if large else mantissa
-    exponent = np.float32(exponent) + (_ONE if large else np.float32(0.0))
+    exponent += _ONE if large else np.float32(0.0)
     x = mantissa - _ONE
     # log(1 + x) = 2 artanh(s), s = x/(2 + x), |s| <= 0.1716
     s = x / (np.float32(2.0) + x)

@@ -6,7 +6,8 @@ An estimator module has one public function ``make(setup, ...) -> Estimator``. I
 as ``batch(seed, first_history, count)`` from several threads at once and returns a dictionary of
 float64 arrays: for each quantity the SUM over the ``count`` histories numbered from
 ``first_history``, with every packet launched at weight 1 (so sums divided by counts are shares of
-the pulse energy). The arrays are fresh for each call and the same keys and shapes come back always.
+the pulse energy). The arrays are fresh for each call and the same keys and shapes come back always, also
+for a ``count`` of 0, with which kernels are compiled before the clock starts.
 The random numbers of a history follow from ``seed`` and its number alone. ``exact`` holds what was
 computed instead of sampled, per packet, under the same keys; it is added to the means and has no
 error. Estimators of pictures tally ``target`` and ``backscatter``, shaped (rows, columns), and
@@ -25,7 +26,7 @@ from collections import deque
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,7 +79,9 @@ class Effort:
     batches: int
     cpu_seconds: float
     wall_seconds: float
+    threads: int
     interrupted: bool = False
+    notes: tuple[str, ...] = ()
 
 
 class Ledger(Protocol):
@@ -174,6 +177,7 @@ def run(
         Only when no batch was finished; otherwise the interruption is told in the result.
     """
     count_threads = threads or len(os.sched_getaffinity(0))
+    estimator.batch(seed, 0, 0)  # compiles, or loads from the cache on disk
     start = time.perf_counter()
     cpu_seconds, packets, batches, interrupted = 0.0, 0, 0, False
 
@@ -209,7 +213,10 @@ def run(
         interrupted = True
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
-    return Effort(packets, batches, cpu_seconds, time.perf_counter() - start, interrupted)
+    nothing = until.rel_error is not None and np.isinf(ledger.relative_error(until.quantity))
+    notes = ("no packet brought any energy, so the relative error is not known",) if nothing else ()
+    wall_seconds = time.perf_counter() - start
+    return Effort(packets, batches, cpu_seconds, wall_seconds, count_threads, interrupted, notes)
 
 
 def _batch_sizes(size: int, packets: int | None) -> Iterator[int]:

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from numba import types
 from numba.extending import overload
 
 from imclab.transport import phase_sampling
@@ -23,52 +22,60 @@ class HenyeyGreensteinLaw(NamedTuple):
     asymmetry: float
 
 
-def sample_deviation(phase: Any, u: float) -> float:
+def sample_deviation(phase: Any, u: Any) -> Any:
     """Draw a deviation from a phase function with one uniform number in (0, 1)."""
     raise NotImplementedError("called from kernels only")
 
 
-def phase_density(phase: Any, deviation: float) -> float:
+def phase_density(phase: Any, deviation: Any) -> Any:
     """Return the phase function in 1/sr at a deviation."""
     raise NotImplementedError("called from kernels only")
 
 
 @device
-def henyey_greenstein_deviation(asymmetry: Any, u: Any) -> Any:
+def henyey_greenstein_deviation(asymmetry: Any, u: Any, one: Any) -> Any:
     """Return the deviation that a uniform number stands for.
 
     The usual formula for the cosine with 1 - mu taken out by algebra: no cancellation near the
-    forward direction, no division by the asymmetry, so it holds from -1 to 1 and through 0. Written
-    without literals so that it keeps the precision of its arguments.
+    forward direction, no division by the asymmetry, so it holds from -1 to 1 and through 0. ``one``
+    is 1 in the precision wanted, because a literal would widen single precision to double.
     """
-    double = u + u
-    d = (asymmetry - asymmetry * double) + (u - u + 1)
-    narrow = 1 - asymmetry
-    return min(narrow * narrow * double * (1 + asymmetry * (1 - u)) / (d * d), u - u + 2)
+    narrow, wide = one - asymmetry, one + asymmetry
+    d = wide - (asymmetry + asymmetry) * u
+    return min(narrow * narrow * u * (wide + d) / (d * d), one + one)
 
 
-def _is_henyey_greenstein(phase: Any) -> bool:
-    return isinstance(phase, types.NamedTuple) and phase.instance_class is HenyeyGreensteinLaw
+def _is_closed_form(phase: Any) -> bool:
+    return getattr(phase, "instance_class", None) is HenyeyGreensteinLaw
 
 
-@overload(sample_deviation, inline="never")
-def _sample_deviation(phase: Any, u: Any) -> Any:
-    if _is_henyey_greenstein(phase):
-        return lambda phase, u: henyey_greenstein_deviation(phase.asymmetry, u)
-    return lambda phase, u: phase_sampling.sample(phase, u)
+# Typing and implementation must agree in annotations too, so the implementations stand here by name.
+def _sample_closed_form(phase: Any, u: Any) -> Any:
+    return henyey_greenstein_deviation(phase.asymmetry, u, 1.0)
 
 
-@overload(phase_density, inline="never")
-def _phase_density(phase: Any, deviation: Any) -> Any:
-    if _is_henyey_greenstein(phase):
-        return _henyey_greenstein_density
-    return lambda phase, deviation: phase_sampling.evaluate(phase, deviation)
+def _sample_table(phase: Any, u: Any) -> Any:
+    return phase_sampling.sample(phase, u)
 
 
-def _henyey_greenstein_density(phase: Any, deviation: Any) -> Any:
+def _density_closed_form(phase: Any, deviation: Any) -> Any:
     g = phase.asymmetry
     square = (1.0 - g) * (1.0 - g) + 2.0 * g * deviation
     return (1.0 - g) * (1.0 + g) / (4.0 * math.pi * square * math.sqrt(square))
+
+
+def _density_table(phase: Any, deviation: Any) -> Any:
+    return phase_sampling.evaluate(phase, deviation)
+
+
+@overload(sample_deviation)  # type: ignore[untyped-decorator]
+def _sample_deviation(phase: Any, u: Any) -> Any:
+    return _sample_closed_form if _is_closed_form(phase) else _sample_table
+
+
+@overload(phase_density)  # type: ignore[untyped-decorator]
+def _phase_density(phase: Any, deviation: Any) -> Any:
+    return _density_closed_form if _is_closed_form(phase) else _density_table
 
 
 @device

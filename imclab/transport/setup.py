@@ -69,11 +69,11 @@ class Gate(NamedTuple):
 
 
 class TimeBins(NamedTuple):
-    """Even bins of the arrival time of the pulse's peak; ``count`` 0 leaves them out."""
+    """Even bins of the arrival time of the pulse's peak; ``bins`` 0 leaves them out."""
 
     start: float
     width: float
-    count: int
+    bins: int
 
 
 class Setup(NamedTuple):
@@ -103,7 +103,7 @@ def setup_of(scene: Scene, *, time_bins: int = 0) -> Setup:
         When the receiver stands behind the water's surface or beyond the target.
     """
     water, phase = water_of(scene)
-    target, receiver = _target_of(scene), _receiver_of(scene)
+    target, receiver = _target_of(scene, water.refractive_index), _receiver_of(scene)
     gate = _gate_of(scene, water.group_velocity)
     start, end = time_window(scene, gate, water.group_velocity)
     sigma = pulse_sigma(scene)
@@ -144,10 +144,10 @@ def beam_of(scene: Scene, refractive_index: float) -> Beam:
     return Beam(scene.laser.spot_fwhm / FWHM_PER_SIGMA, divergence / FWHM_PER_SIGMA)
 
 
-def _target_of(scene: Scene) -> Target:
-    target = scene.target
-    figure = surface_of(scene, target.figure)
-    ground = figure if target.ground is None else surface_of(scene, target.ground)
+def _target_of(scene: Scene, refractive_index: float) -> Target:
+    target, wavelength = scene.target, scene.laser.wavelength
+    figure = surface_of(target.figure, refractive_index, wavelength)
+    ground = figure if target.ground is None else surface_of(target.ground, refractive_index, wavelength)
     mask = np.ascontiguousarray(scene.figure_mask, dtype=np.uint8)
     return Target(target.distance, target.width / 2.0, target.height / 2.0, mask, figure, ground)
 
