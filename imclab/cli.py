@@ -14,6 +14,7 @@ import click
 import typer
 
 import imclab
+from imclab.commands.twin import twin
 
 app = typer.Typer(
     name="imclab",
@@ -38,6 +39,9 @@ def _root(
     ] = False,
 ) -> None:
     """Find out whether the simulation of a range-gated underwater imaging rig can be believed."""
+
+
+app.command("twin")(twin)
 
 
 def _tell(error: BaseException, code: int) -> int:

@@ -29,6 +29,11 @@ class Condition(Part):
     reference: str | None = None
     scene: dict[str, Any] = Field(default_factory=dict)
 
+    @property
+    def scene_changes(self) -> dict[str, Any]:
+        """What of the scene this condition changes, as dotted paths."""
+        return _flat(self.scene)
+
 
 class Simulation(Part):
     """How well each condition is simulated."""
@@ -69,6 +74,10 @@ class Experiment(Part):
                 raise ValueError(f'wanted reference to be a condition: "{reference}" is none of {names}')
         return self
 
+    def with_simulation(self, simulation: Simulation) -> Experiment:
+        """Return the same experiment, simulated in another way."""
+        return self.model_copy(update={"simulation": simulation})
+
     @property
     def folder(self) -> Path:
         """Folder of the experiment file."""
@@ -108,7 +117,7 @@ def load_experiment(path: str | Path) -> Experiment:
     for index, condition in enumerate(experiment.condition):
         where = f"condition[{index}] {condition.name}"
         try:
-            changes = _from_folder(condition.scene, path.parent, base.folder)
+            changes = _from_folder(condition.scene_changes, path.parent, base.folder)
             experiment._scenes[condition.name] = base.with_(**changes)
         except InputError as error:
             faults += [Fault(f"{where}.scene.{f.where}", f.came, f.wanted, f.advice) for f in error.faults]
@@ -126,7 +135,7 @@ def load_experiment(path: str | Path) -> Experiment:
 
 def _from_folder(changes: dict[str, Any], folder: Path, scene_folder: Path) -> dict[str, Any]:
     """Let file names in scene changes be relative to the experiment file, as every name in it is."""
-    changes = _flat(copy.deepcopy(changes))
+    changes = copy.deepcopy(changes)
     mask = changes.get("target.mask")
     if isinstance(mask, str):
         changes["target.mask"] = Path(os.path.relpath(folder / mask, scene_folder)).as_posix()

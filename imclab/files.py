@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import secrets
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -34,16 +35,31 @@ def written_whole(path: str | Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
-def empty_folder(path: str | Path) -> Path:
-    """Make ``path`` if need be and return it; refuse one that holds something already."""
+@contextmanager
+def folder_written_whole(path: str | Path) -> Iterator[Path]:
+    """Give an empty temporary folder beside ``path``; rename it to ``path`` when the block succeeds.
+
+    Raises
+    ------
+    InputError
+        When ``path`` is a file or a folder that holds something already.
+    OutputError
+        When it cannot be made.
+    """
     folder = Path(path)
+    if folder.exists() and not folder.is_dir():
+        raise InputError(str(folder), [Fault("output", "a file", "a folder")])
+    if folder.is_dir() and any(folder.iterdir()):
+        wanted = "a folder that is empty or does not exist"
+        raise InputError(str(folder), [Fault("output", "a folder with files in it", wanted)])
+    temporary = folder.with_name(f".{folder.name}.{os.getpid()}.{secrets.token_hex(4)}.part")
     try:
-        if folder.exists() and not folder.is_dir():
-            raise InputError(str(folder), [Fault("output", "a file", "a folder")])
-        if folder.is_dir() and any(folder.iterdir()):
-            wanted = "a folder that is empty or does not exist"
-            raise InputError(str(folder), [Fault("output", "a folder with files in it", wanted)])
-        folder.mkdir(parents=True, exist_ok=True)
+        temporary.mkdir(parents=True)
+        yield temporary
+        if folder.is_dir():
+            folder.rmdir()
+        temporary.replace(folder)
     except OSError as error:
-        raise OutputError(f"{folder}: cannot be made ({error.strerror or error})") from error
-    return folder
+        raise OutputError(f"{folder}: cannot be written ({error.strerror or error})") from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)

@@ -58,7 +58,7 @@ def parse(text: str, kind: str) -> float:
     if _BARE_NUMBER.match(text):
         raise UnitError(f"a unit is missing; wanted {wanted}")
     try:
-        quantity = _registry().parse_expression(text.replace("µ", "u").replace("μ", "u"))
+        quantity = _registry().parse_expression(_plain(text))
         value = float(quantity.to(unit).magnitude)
     except Exception as error:  # pint raises many unrelated kinds, tokenizer errors among them
         raise UnitError(f"wanted {wanted}") from error
@@ -67,3 +67,23 @@ def parse(text: str, kind: str) -> float:
     if not math.isfinite(value):
         raise UnitError(f"not finite; wanted {wanted}")
     return value
+
+
+def sum_of(first: str, second: str) -> str:
+    """Return the sum of two quantities as text, in the unit of ``first``.
+
+    Raises
+    ------
+    UnitError
+        When one is no quantity, or their dimensions differ.
+    """
+    try:
+        start = _registry().parse_expression(_plain(first))
+        total = (start + _registry().parse_expression(_plain(second))).to(start.units)
+        return f"{total.magnitude} {total.units:~C}"
+    except Exception as error:  # pint raises many unrelated kinds, tokenizer errors among them
+        raise UnitError(f'wanted two quantities of one kind, not "{first}" and "{second}"') from error
+
+
+def _plain(text: str) -> str:
+    return text.replace("µ", "u").replace("μ", "u")
