@@ -14,6 +14,7 @@ import click
 import typer
 
 import imclab
+from imclab.commands.sweep import sweep
 from imclab.commands.twin import twin
 
 app = typer.Typer(
@@ -42,6 +43,7 @@ def _root(
 
 
 app.command("twin")(twin)
+app.command("sweep")(sweep)
 
 
 def _tell(error: BaseException, code: int) -> int:

@@ -1,0 +1,69 @@
+"""``imclab sweep``: many scenes from one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from imclab.commands.console import JSON_OPTION, Progress, emit
+
+
+def sweep(
+    scene: Annotated[Path, typer.Argument(help="The scene file that all units start from.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="Folder for units, table and plot.")],
+    settings: Annotated[
+        list[str] | None,
+        typer.Option("--set", help='KEY="VALUE,VALUE" or KEY="START to STOP in COUNT [log]"; several times.'),
+    ] = None,
+    zipped: Annotated[
+        bool, typer.Option("--zip", help="Take the lists side by side instead of all combinations.")
+    ] = False,
+    one_way: Annotated[
+        bool, typer.Option("--one-way", help="One way, as `imclab transmit`, instead of pictures.")
+    ] = False,
+    distances: Annotated[
+        str | None, typer.Option(help='Planes of the one-way run, as "1 m, 5 m" or "1 m to 30 m in 10".')
+    ] = None,
+    rel_error: Annotated[float | None, typer.Option(help="Stop each unit at this relative error.")] = None,
+    seconds: Annotated[float | None, typer.Option(help="Stop each unit after so long.")] = None,
+    packets: Annotated[float | None, typer.Option(help="Stop each unit after so many packets.")] = None,
+    estimator: Annotated[str | None, typer.Option(help="auto, analog, expected or two-sided.")] = None,
+    seed: Annotated[int | None, typer.Option(help="Seed of every unit; else that of the scene.")] = None,
+    workers: Annotated[int | None, typer.Option(min=1, help="Processes; default: one a processor.")] = None,
+    dask: Annotated[str | None, typer.Option(help="Scheduler of a Dask cluster, tcp://HOST:PORT.")] = None,
+    as_json: Annotated[bool, JSON_OPTION] = False,
+) -> None:
+    """Run a scene with any of its keys over lists or ranges; the same command again resumes.
+
+    Example: imclab sweep data/scenes/tank.toml --set medium.attenuation="0.42 1/m to 1.42 1/m in 6" -o DIR
+    """
+    from imclab.errors import InterruptedRunError
+    from imclab.scene import load_scene
+    from imclab.sweep import OneWay, SweepFailedError, parse_axis, parse_distances, plan, run, with_run
+
+    base = with_run(
+        load_scene(scene),
+        rel_error=rel_error,
+        seconds=seconds,
+        packets=packets,
+        estimator=estimator,
+        seed=seed,
+    )
+    planes = OneWay(parse_distances(distances)) if one_way or distances else None
+    axes = [parse_axis(setting) for setting in settings or []]
+    units, refused = plan(base, axes, one_way=planes, zipped=zipped)
+    progress = Progress()
+    outcome = run(units, output, refused=refused, workers=workers, dask=dask, progress=progress)
+    progress.close()
+    words = f"{output}: {len(outcome.records)} of {len(units) + len(refused)} units finished"
+    emit(
+        outcome.summary() | {"folder": str(output)},
+        f"{words} ({outcome.resumed} found finished)",
+        as_json=as_json,
+    )
+    if outcome.interrupted:
+        raise InterruptedRunError(f"interrupted; {words}. The same command continues.")
+    if outcome.failures:
+        raise SweepFailedError(outcome.failures, len(outcome.records))
