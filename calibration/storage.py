@@ -25,13 +25,17 @@ VERSION = 1
 
 def save(camera: Calibration, path: Path) -> None:
     """Write ``camera`` to ``path`` under a temporary name, then put it in place."""
-    path.parent.mkdir(parents=True, exist_ok=True)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         with h5py.File(temporary, "w") as file:
             _write(camera, file)
             file.attrs["digest"] = _digest(file)
         temporary.replace(path)
+    except OSError as error:
+        raise StoredFileError(
+            f"{path}: cannot be written ({error.strerror or error}). "
+            "Name a file in a folder that exists and may be written to."
+        ) from None
     finally:
         temporary.unlink(missing_ok=True)
 

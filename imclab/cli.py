@@ -14,6 +14,7 @@ import click
 import typer
 
 import imclab
+from imclab.commands.calibrate import calibrate
 from imclab.commands.sweep import sweep
 from imclab.commands.twin import twin
 
@@ -42,6 +43,7 @@ def _root(
     """Find out whether the simulation of a range-gated underwater imaging rig can be believed."""
 
 
+app.command("calibrate")(calibrate)
 app.command("twin")(twin)
 app.command("sweep")(sweep)
 

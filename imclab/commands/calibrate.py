@@ -28,7 +28,7 @@ def calibrate(
 ) -> None:
     """Calibrate the camera: response, intensifier gain, noise, pixel maps, with uncertainties."""
     import calibration
-    from imclab.calibration_page import summary, write_page
+    from imclab.report.calibration_page import summary, write_page
 
     progress = Progress()
     try:
@@ -38,6 +38,6 @@ def calibrate(
     camera.save(output)
     page = write_page(camera, report) if report is not None else None
     told = summary(camera)
-    written = f"{output}" + (f", {page}" if page else "")
-    emit({"output": str(output), "report": page and str(page), **told.data}, f"{told.text}\nwrote {written}",
-         as_json=as_json)
+    written = f"{output}, {page}" if page else f"{output}"
+    data = {"output": str(output), "report": page and str(page), **told.data}
+    emit(data, f"{told.text}\nwrote {written}", as_json=as_json)

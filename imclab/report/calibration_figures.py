@@ -20,15 +20,18 @@ def response_figure(camera: Calibration) -> Figure:
     nodes = camera.response.log_counts.size
     error = np.sqrt(np.maximum(np.diag(camera.covariance)[:nodes], 0.0))
     upper.loglog(exposure, counts, color="0.3", lw=1.2, label="response")
-    low, high = np.exp(camera.response.log_exposure - 1.96 * error), np.exp(
-        camera.response.log_exposure + 1.96 * error
+    low, high = (
+        np.exp(camera.response.log_exposure - 1.96 * error),
+        np.exp(camera.response.log_exposure + 1.96 * error),
     )
     upper.fill_betweenx(np.exp(camera.response.log_counts), low, high, color="0.75", label="95 %")
     for gain in camera.gains:
         here = (table["gain"] == gain) & np.isfinite(table["energy"]) & ~table["clipped"]
         at = table["energy"][here] * camera.relative_gain(gain)[0]
         upper.plot(at, table["counts"][here], "o", ms=4, label=f"gain {gain:g}")
-        lower.errorbar(at, 100 * table["residual"][here], 100 * table["residual_scatter"][here], fmt="o", ms=3, lw=0.8)
+        lower.errorbar(
+            at, 100 * table["residual"][here], 100 * table["residual_scatter"][here], fmt="o", ms=3, lw=0.8
+        )
     lower.axhline(0.0, color="0.3", lw=0.8)
     lower.set_ylabel("residual, %")
     lower.set_xlabel(f"exposure: energy × relative gain, {camera.unit}")
@@ -45,8 +48,13 @@ def transfer_figure(camera: Calibration) -> Figure:
     for index, gain in enumerate(camera.gains):
         here = (table["gain"] == gain) & np.isfinite(table["variance"])
         axes.errorbar(
-            table["counts"][here], table["variance"][here], table["variance_stderr"][here],
-            fmt="o", ms=3, color=f"C{index}", label=f"gain {gain:g}",
+            table["counts"][here],
+            table["variance"][here],
+            table["variance_stderr"][here],
+            fmt="o",
+            ms=3,
+            color=f"C{index}",
+            label=f"gain {gain:g}",
         )
         counts = np.geomspace(camera.response.lowest, camera.response.highest, 200)
         energy = camera.response.exposure(counts) / camera.relative_gain(gain)[0]
@@ -68,7 +76,9 @@ def gain_figure(camera: Calibration) -> Figure:
     if law is not None:
         at = np.linspace(gains.min(), gains.max(), 200)
         upper.plot(at, np.exp(law.log_gain(at)), color="0.4", lw=1.0, label=f"{law.name} law")
-        lower.errorbar(gains, 100 * (value / np.exp(law.log_gain(gains)) - 1), 196 * error / value, fmt="o", ms=4)
+        lower.errorbar(
+            gains, 100 * (value / np.exp(law.log_gain(gains)) - 1), 196 * error / value, fmt="o", ms=4
+        )
     lower.axhline(0.0, color="0.3", lw=0.8)
     lower.set_ylabel("off the law, %")
     lower.set_xlabel(f"gain setting{', ' + camera.setup.gain_unit if camera.setup.gain_unit else ''}")
@@ -86,7 +96,9 @@ def maps_figure(camera: Calibration) -> Figure:
     axes = figure.subplots(1, 3)
     for one, (title, picture) in zip(axes, panels, strict=False):
         low, high = np.quantile(picture[good], [0.005, 0.995])
-        shown = one.imshow(picture, vmin=low, vmax=max(high, low + 1e-6), cmap="viridis", interpolation="none")
+        shown = one.imshow(
+            picture, vmin=low, vmax=max(high, low + 1e-6), cmap="viridis", interpolation="none"
+        )
         figure.colorbar(shown, ax=one, shrink=0.8)
         one.set_title(title, fontsize=9)
     rows, columns = np.nonzero(camera.bad_pixels)
