@@ -94,7 +94,9 @@ def make_pair(
 def target_free_frame(seed: int, shape: tuple[int, int] = (256, 320)) -> NDArray[np.generic]:
     """Beam, background, speckle and dead pixels, but no figure."""
     rng = np.random.default_rng([seed, 77])
-    return _measured(rng, np.full(shape, rng.uniform(0.0, 1.0), np.float32), 10.0, noise=rng.uniform(0.02, 0.3))
+    return _measured(
+        rng, np.full(shape, rng.uniform(0.0, 1.0), np.float32), 10.0, noise=rng.uniform(0.02, 0.3)
+    )
 
 
 def _binned(fine: NDArray[np.float32], factor: int = FINE) -> NDArray[np.float32]:
@@ -130,7 +132,9 @@ def _motion(rng: np.random.Generator, band: str, shape: tuple[int, int]) -> NDAr
     return np.asarray(total / total[2, 2])
 
 
-def _through(albedo: NDArray[np.float32], matrix: NDArray[np.float64], shape: tuple[int, int]) -> NDArray[np.float32]:
+def _through(
+    albedo: NDArray[np.float32], matrix: NDArray[np.float64], shape: tuple[int, int]
+) -> NDArray[np.float32]:
     """Integrate the fine raster over the pixels of the frame, through the motion."""
     over = 4
     rows, cols = shape
@@ -197,7 +201,12 @@ def _slit(rng: np.random.Generator) -> list[NDArray[np.float64]]:
 
 def _bars(rng: np.random.Generator) -> list[NDArray[np.float64]]:
     polygons = []
-    for x, y, width, upright in ((-0.28, -0.25, 0.07, 1), (0.26, -0.26, 0.055, 0), (-0.3, 0.3, 0.04, 0), (0.25, 0.27, 0.03, 1)):
+    for x, y, width, upright in (
+        (-0.28, -0.25, 0.07, 1),
+        (0.26, -0.26, 0.055, 0),
+        (-0.3, 0.3, 0.04, 0),
+        (0.25, 0.27, 0.03, 1),
+    ):
         width = width * rng.uniform(0.85, 1.2)
         for k in (-1, 0, 1):
             box = np.array([[-0.5, -2.5], [0.5, -2.5], [0.5, 2.5], [-0.5, 2.5]]) * width + [2 * k * width, 0]

@@ -57,7 +57,11 @@ def _template(reference: Reference, angle_deg: float, reduction: float) -> NDArr
     size = 2 * half + 1
     return np.asarray(
         cv2.warpAffine(
-            soft, matrix, (size, size), flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP, borderMode=cv2.BORDER_REPLICATE
+            soft,
+            matrix,
+            (size, size),
+            flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
+            borderMode=cv2.BORDER_REPLICATE,
         )
     )
 
@@ -82,7 +86,11 @@ def _flattened(picture: NDArray[np.float64]) -> NDArray[np.float32]:
 
 
 def _at_scale(
-    reference: Reference, flat: NDArray[np.float32], scale: float, reduction: float, templates: list[NDArray[np.float32]]
+    reference: Reference,
+    flat: NDArray[np.float32],
+    scale: float,
+    reduction: float,
+    templates: list[NDArray[np.float32]],
 ) -> list[Candidate]:
     rows, cols = flat.shape
     shrink = 1.0 / (reduction * scale)

@@ -1,41 +1,39 @@
 """The generative fit: the clean simulated picture, moved, blurred and lit until it is the raw frame.
 
-The frame is never resampled. Per pixel the model is
-
-    background(u, v) + R·(a + b u + c v) + d R² + e H
-
-with R the simulated picture through the motion and a Gaussian blur, H the same through a wide blur
-(halo), and a quadratic background: tone, illumination, halo and background enter linearly and are
-solved at every step (variable projection); motion and blur are stepped by damped Gauss–Newton with
-Huber weights against hot pixels.
+The frame is never resampled. The amplitudes of the appearance are solved at every step (variable
+projection); motion and blur are stepped by damped Gauss–Newton with Huber weights against hot
+pixels. Where the data say little about perspective and stretch, a weak prior on them does.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from imclab.registration import sampling
-from imclab.registration.motion import Matrix, jacobian, stepped, velocities
+from imclab.registration.appearance import BACKGROUND, FULL, Fields, slopes, terms
+from imclab.registration.motion import Matrix, Prior, moved_back, stepped, velocities
 from imclab.registration.reference import Reference
 
 Vector = NDArray[np.float64]
 
 _HUBER = 1.5
 """Residuals beyond so many standard deviations count linearly."""
-_BACKGROUND_TERMS = 6
-_FIGURE_TERMS = 5
+_CONVERGED_PX = 2e-3
+_LONGEST_STEP_PX = 3.0
+_LARGEST_BLUR = 100.0
 
 
 class Pixels(NamedTuple):
-    """Pixels of the frame that take part: places (x, y) and values."""
+    """Pixels of the frame that take part: places (x, y), values, and the width of a pixel."""
 
     x: Vector
     y: Vector
     value: Vector
+    width: int
 
 
 class State(NamedTuple):
@@ -52,7 +50,7 @@ class Linearised:
     Attributes
     ----------
     linear : float64 array (terms, n)
-        Basis of background and figure.
+        Terms of the appearance, background first.
     slopes : float64 array (parameters + 1, n)
         Derivatives of the model by motion and blur.
     amplitudes : float64 array (terms,)
@@ -67,35 +65,59 @@ class Linearised:
     weight: Vector
 
     def cost(self, weight: Vector) -> float:
-        """Weighted sum of squares."""
+        """Weighted sum of squares of the residual."""
         return float(weight @ self.residual**2)
+
+    def projected_slopes(self) -> Vector:
+        """Return the slopes without what the amplitudes could explain."""
+        coupling = _least_squares(self.linear, self.weight, self.slopes.T)
+        return self.slopes - coupling.T @ self.linear
+
+    def explained(self, value: Vector) -> float:
+        """Share of the frame's structure, beyond the background, that the figure explains."""
+        background = self.linear[:BACKGROUND]
+        rest = value - _least_squares(background, self.weight, value) @ background
+        return max(1 - self.cost(self.weight) / max(float(self.weight @ rest**2), 1e-300), 0.0)
 
 
 def choose_pixels(frame: Pixels, reference: Reference, matrix: Matrix) -> Pixels:
     """Keep the pixels that see the target or its surroundings, under a first motion."""
     rows, cols = reference.picture.shape
-    x, y = _back(matrix, frame)
-    inside = (x > 2.5) & (x < cols - 3.5) & (y > 2.5) & (y < rows - 3.5)
-    near = inside.copy()
-    near[inside] = reference.distance[y[inside].round().astype(int), x[inside].round().astype(int)] < reference.margin
-    return Pixels(*(part[near] for part in frame))
+    x, y = moved_back(matrix, frame.x, frame.y)
+    near = (x > 2.5) & (x < cols - 3.5) & (y > 2.5) & (y < rows - 3.5)
+    distance = reference.distance[y[near].round().astype(int), x[near].round().astype(int)]
+    near[near] = distance < reference.margin
+    return Pixels(frame.x[near], frame.y[near], frame.value[near], frame.width)
 
 
-def fit(reference: Reference, pixels: Pixels, start: State, *, parameters: int, steps: int) -> Linearised:
-    """Fit motion and blur from a start; returns the model at the best state found."""
-    best = _linearised(reference, pixels, start, parameters, None)
+def fit(
+    reference: Reference,
+    pixels: Pixels,
+    start: State,
+    *,
+    parameters: int,
+    steps: int,
+    term_count: int = FULL,
+    prior: Prior | None = None,
+) -> Linearised:
+    """Fit motion and blur from a start; return the model at the best state found."""
+    best = _reweighted(
+        _linearised(reference, pixels, start, parameters, term_count, np.ones_like(pixels.value))
+    )
     damping = 1e-3
     for _ in range(steps):
-        step = _solved(best, damping)
+        step = _step(best, damping, reference, prior)
         reach = float(np.abs(step[:-1]).max()) * reference.frame.radius
-        step = step * min(1.0, 3.0 / max(reach, 1e-12))
+        step = step * min(1.0, _LONGEST_STEP_PX / max(reach, 1e-12))
         blur = float(np.clip(best.state.blur + step[-1], 0.25 * best.state.blur, 4 * best.state.blur + 0.5))
-        state = State(stepped(best.state.matrix, step[:-1], reference.frame), min(blur, 100.0))
-        trial = _linearised(reference, pixels, state, parameters, best.weight)
-        if trial.cost(best.weight) <= best.cost(best.weight):
+        state = State(stepped(best.state.matrix, step[:-1], reference.frame), min(blur, _LARGEST_BLUR))
+        trial = _linearised(reference, pixels, state, parameters, term_count, best.weight)
+        if _objective(trial, best.weight, reference, prior) <= _objective(
+            best, best.weight, reference, prior
+        ):
             best = _reweighted(trial)
             damping = max(damping / 5, 1e-6)
-            if reach < 2e-3:
+            if reach < _CONVERGED_PX:
                 break
         else:
             damping *= 10
@@ -104,63 +126,59 @@ def fit(reference: Reference, pixels: Pixels, start: State, *, parameters: int, 
     return best
 
 
-def _back(matrix: Matrix, pixels: Pixels) -> tuple[Vector, Vector]:
-    inverse = np.linalg.inv(matrix)
-    depth = inverse[2, 0] * pixels.x + inverse[2, 1] * pixels.y + inverse[2, 2]
-    x = (inverse[0, 0] * pixels.x + inverse[0, 1] * pixels.y + inverse[0, 2]) / depth
-    y = (inverse[1, 0] * pixels.x + inverse[1, 1] * pixels.y + inverse[1, 2]) / depth
-    return x, y
+def _objective(model: Linearised, weight: Vector, reference: Reference, prior: Prior | None) -> float:
+    penalty = 0.0 if prior is None else prior.penalty(model.state.matrix, reference.frame)
+    return model.cost(weight) + penalty
 
 
 def _linearised(
-    reference: Reference, pixels: Pixels, state: State, parameters: int, weight: Vector | None
+    reference: Reference, pixels: Pixels, state: State, parameters: int, term_count: int, weight: Vector
 ) -> Linearised:
-    x, y = _back(state.matrix, pixels)
-    sharp, wide = np.empty((4, x.size)), np.empty((4, x.size))
-    sampling.sample(sampling.coefficients(reference.picture, state.blur), x, y, sharp)
-    sampling.sample(reference.halo, x, y, wide)
-    u = 2 * (pixels.x - pixels.x.mean()) / np.ptp(pixels.x)
-    v = 2 * (pixels.y - pixels.y.mean()) / np.ptp(pixels.y)
-    figure = sharp[0]
-    linear = np.stack(
-        [np.ones_like(u), u, v, u * u, u * v, v * v, figure, figure * u, figure * v, figure * figure, wide[0]]
-    )
-    used = np.ones_like(u) if weight is None else weight
-    weighted = linear * used
-    gram = weighted @ linear.T
-    gram[np.diag_indices_from(gram)] *= 1 + 1e-9
-    amplitudes = np.linalg.solve(gram, weighted @ pixels.value)
-    residual = pixels.value - amplitudes @ linear
-    a, b, c, d, e = amplitudes[_BACKGROUND_TERMS:]
-    tone = a + b * u + c * v + 2 * d * figure
-    slope_x = tone * sharp[1] + e * wide[1]
-    slope_y = tone * sharp[2] + e * wide[2]
+    x, y = moved_back(state.matrix, pixels.x, pixels.y)
+    fields = _fields(reference, pixels, state.blur, x, y)
+    linear = terms(fields, term_count)
+    amplitudes = _least_squares(linear, weight, pixels.value)
+    by_x, by_y, by_blur = slopes(fields, amplitudes)
     frame = reference.frame
     speeds = velocities((x - frame.x) / frame.radius, (y - frame.y) / frame.radius, parameters)
-    slopes = np.stack([-frame.radius * (slope_x * p + slope_y * q) for p, q in speeds] + [tone * sharp[3] / 2])
-    new = Linearised(state, linear, slopes, amplitudes, residual, used)
-    return _reweighted(new) if weight is None else new
+    by_motion = [-frame.radius * (by_x * p + by_y * q) for p, q in speeds]
+    residual = pixels.value - amplitudes @ linear
+    return Linearised(state, linear, np.stack([*by_motion, by_blur]), amplitudes, residual, weight)
+
+
+def _fields(reference: Reference, pixels: Pixels, blur: float, x: Vector, y: Vector) -> Fields:
+    sampled = np.empty((3, 4, x.size))
+    for spline, out in zip(
+        (sampling.coefficients(reference.picture, blur), reference.halo, reference.veil), sampled, strict=True
+    ):
+        sampling.sample(spline, x, y, out)
+    u, v = (2 * (place - place.mean()) / max(np.ptp(place), 1.0) for place in (pixels.x, pixels.y))
+    return Fields(sampled[0], sampled[1], sampled[2], u, v)
+
+
+def _least_squares(linear: Vector, weight: Vector, target: Vector) -> Vector:
+    """Solve for amplitudes; a ridge of 1e-9 keeps terms apart that a two-valued picture makes equal."""
+    weighted = linear * weight
+    gram = weighted @ linear.T
+    gram[np.diag_indices_from(gram)] *= 1 + 1e-9
+    gram[np.diag_indices_from(gram)] += 1e-300
+    return np.asarray(np.linalg.solve(gram, weighted @ target))
 
 
 def _reweighted(model: Linearised) -> Linearised:
-    scale = 1.4826 * float(np.median(np.abs(model.residual))) + 1e-12 * float(np.abs(model.amplitudes).max())
-    size = np.abs(model.residual) / max(scale, 1e-300)
-    weight = np.where(size > _HUBER, _HUBER / np.maximum(size, 1e-12), 1.0)
-    return Linearised(model.state, model.linear, model.slopes, model.amplitudes, model.residual, weight)
+    floor = 1e-12 * float(np.abs(model.amplitudes).max()) + 1e-300
+    size = np.abs(model.residual) / (1.4826 * float(np.median(np.abs(model.residual))) + floor)
+    return replace(model, weight=_HUBER / np.maximum(size, _HUBER))
 
 
-def normal_equations(model: Linearised) -> tuple[Vector, Vector]:
-    """Return the information of motion and blur with the linear terms projected out, and the slopes so projected."""
-    weighted = model.linear * model.weight
-    gram = weighted @ model.linear.T
-    gram[np.diag_indices_from(gram)] *= 1 + 1e-9
-    projected = model.slopes - np.linalg.solve(gram, weighted @ model.slopes.T).T @ model.linear
-    return (projected * model.weight) @ projected.T, projected
-
-
-def _solved(model: Linearised, damping: float) -> Vector:
-    information, projected = normal_equations(model)
-    right = (projected * model.weight) @ model.residual
+def _step(model: Linearised, damping: float, reference: Reference, prior: Prior | None) -> Vector:
+    projected = model.projected_slopes()
+    weighted = projected * model.weight
+    information, right = weighted @ projected.T, weighted @ model.residual
+    if prior is not None:
+        pull, stiffness = prior.pull(model.state.matrix, reference.frame, len(right))
+        information, right = information + np.diag(stiffness), right + pull
     diagonal = np.diag(information)
-    information = information + np.diag(damping * diagonal + 1e-12 * diagonal.max() + 1e-300)
-    return np.asarray(np.linalg.solve(information, right))
+    return np.asarray(
+        np.linalg.solve(information + np.diag(damping * diagonal + 1e-12 * diagonal.max() + 1e-300), right)
+    )

@@ -71,7 +71,12 @@ def sample(coefficient, x, y, out):  # type: ignore[no-untyped-def]
 @njit(inline="always", error_model="numpy")  # type: ignore[untyped-decorator]
 def _weights(f):  # type: ignore[no-untyped-def]
     g = 1 - f
-    return g * g * g / 6, (4 - 6 * f * f + 3 * f * f * f) / 6, (4 - 6 * g * g + 3 * g * g * g) / 6, f * f * f / 6
+    return (
+        g * g * g / 6,
+        (4 - 6 * f * f + 3 * f * f * f) / 6,
+        (4 - 6 * g * g + 3 * g * g * g) / 6,
+        f * f * f / 6,
+    )
 
 
 @njit(inline="always", error_model="numpy")  # type: ignore[untyped-decorator]
