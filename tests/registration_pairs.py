@@ -201,13 +201,13 @@ def _slit(rng: np.random.Generator) -> list[NDArray[np.float64]]:
 
 def _bars(rng: np.random.Generator) -> list[NDArray[np.float64]]:
     polygons = []
-    for x, y, width, upright in (
+    for x, y, mean_width, upright in (
         (-0.28, -0.25, 0.07, 1),
         (0.26, -0.26, 0.055, 0),
         (-0.3, 0.3, 0.04, 0),
         (0.25, 0.27, 0.03, 1),
     ):
-        width = width * rng.uniform(0.85, 1.2)
+        width = mean_width * rng.uniform(0.85, 1.2)
         for k in (-1, 0, 1):
             box = np.array([[-0.5, -2.5], [0.5, -2.5], [0.5, 2.5], [-0.5, 2.5]]) * width + [2 * k * width, 0]
             polygons.append((box if upright else box[:, ::-1]) + [x, y])

@@ -120,7 +120,7 @@ def warn_of_range(x: ArrayLike, y: ArrayLike, *, data_range: float) -> None:
     """Warn with DataRangeWarning, from the caller of the metric, when the range cannot be right."""
     advice = range_advice(x, y, data_range=data_range)
     if advice:
-        warnings.warn(advice, DataRangeWarning, stacklevel=4)
+        warnings.warn(advice, DataRangeWarning, stacklevel=3)
 
 
 def _faults_of_picture(name: str, array: NDArray[Any]) -> list[Fault]:

@@ -69,9 +69,9 @@ def _template(reference: Reference, angle_deg: float, reduction: float) -> NDArr
 def _extent(reference: Reference, angle_deg: float) -> float:
     y, x = np.nonzero(reference.target)
     turn = np.deg2rad(angle_deg)
-    x, y = x - reference.frame.x, y - reference.frame.y
-    across = np.abs(np.cos(turn) * x - np.sin(turn) * y).max()
-    down = np.abs(np.sin(turn) * x + np.cos(turn) * y).max()
+    right, low = x - reference.frame.x, y - reference.frame.y
+    across = np.abs(np.cos(turn) * right - np.sin(turn) * low).max()
+    down = np.abs(np.sin(turn) * right + np.cos(turn) * low).max()
     return float(max(across, down))
 
 

@@ -190,12 +190,10 @@ def _judged(
     spread = covariance(fitted, found.left, reference=reference, prior=found.prior)
     rows, cols = shapes[0]
     corners = np.array([[0, 0], [cols - 1, 0], [0, rows - 1], [cols - 1, rows - 1]], dtype=np.float64)
-    y, x = np.nonzero(reference.target)
-    thin = slice(None, None, max(x.size // 500, 1))
+    figure = np.argwhere(reference.target)[:, ::-1].astype(np.float64)
+    thin = slice(None, None, max(len(figure) // 500, 1))
     at_corners = _stderr(matrix, corners, reference, spread)
-    at_target = float(
-        np.sqrt(np.mean(_stderr(matrix, np.column_stack([x, y])[thin], reference, spread) ** 2))
-    )
+    at_target = float(np.sqrt(np.mean(_stderr(matrix, figure[thin], reference, spread) ** 2)))
     share = fitted.explained(found.pixels.value)
     signal = share / max(1 - share, 1e-12) * fitted.cost(fitted.weight)
     contrast = float(np.sqrt(signal / max(found.left.noise, 1e-300)))

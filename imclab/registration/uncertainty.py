@@ -55,8 +55,7 @@ def leftover(model: Linearised, pixels: Pixels) -> Leftover:
     residual, present = np.zeros(shape), np.zeros(shape)
     residual[rows, cols] = model.residual * model.weight
     present[rows, cols] = 1.0
-    box = {"ksize": (_LOCAL, _LOCAL), "borderType": cv2.BORDER_CONSTANT}
-    local = cv2.blur(residual * residual, **box) / np.maximum(cv2.blur(present, **box), 1e-9)
+    local = _neighbourhood(residual * residual) / np.maximum(_neighbourhood(present), 1e-9)
     variance = float(np.mean(residual[rows, cols] ** 2))
     strength = np.sqrt(np.maximum(local, 0.05 * variance) + 1e-300)
     scaled = np.where(present > 0, residual / strength, 0.0)
@@ -83,6 +82,10 @@ def covariance(
         score = score + np.diag(stiffness) * prior.noise
     inverse = np.linalg.pinv(information, hermitian=True)
     return np.asarray((inverse @ score @ inverse)[:-1, :-1])
+
+
+def _neighbourhood(field: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(cv2.blur(field, (_LOCAL, _LOCAL), borderType=cv2.BORDER_CONSTANT))
 
 
 def _score_variance(columns: NDArray[np.float64], left: Leftover) -> NDArray[np.float64]:
