@@ -29,7 +29,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 # Freedoms of the optimiser that keep NaN and inf as they are.
 _FAST = {"contract", "reassoc", "nsz"}
-_BLOCK = 256  # angles worked on together: their arrays stay in the innermost cache
+_BLOCK = 128  # angles worked on together: their rows stay in the innermost cache
 
 
 def _kernel(function: Function) -> Function:
@@ -67,17 +67,40 @@ def _fill_ratios(z: Any, first: int, terms: int, out: Any) -> None:
     proportion to |z| (5e-9 at x = 1e4).
     """
     modulus = abs(z)
-    start = _start_of_recurrence(modulus, abs(z.imag), terms)
-    inverse = 1.0 / z
-    ratio = z / (2.0 * start + 3.0)
-    for n in range(start, terms, -1):
-        below = (2.0 * n + 1.0) * inverse - ratio
-        ratio = 1.0 / (below if below != 0.0 else below + 1e-60)
+    n = _start_of_recurrence(modulus, abs(z.imag), terms)
+    inverse, one = 1.0 / z, 0.0 * z + 1.0
+    ratio = z / (2.0 * n + 3.0)
+    # Stretches of psi itself, psi_{n-1} = (2n+1)/z psi_n - psi_{n+1} from psi_n = 1: too short to
+    # overflow, and their divisions do not wait for each other (1.5 times faster, complex 2.5 times).
+    while n > terms:
+        above, here = ratio, one
+        stretch = min(n - terms, 8)
+        for k in range(stretch):
+            above, here = here, (2.0 * (n - k) + 1.0) * inverse * here - above
+        ratio = _quotient(above, here)
+        n -= stretch
     out[terms] = ratio
-    for n in range(terms, first, -1):
-        below = (2.0 * n + 1.0) * inverse - ratio
-        ratio = 1.0 / (below if below != 0.0 else below + 1e-60)
-        out[n - 1] = ratio
+    while n >= first + 4:
+        psi_1 = (2.0 * n + 1.0) * inverse - ratio
+        psi_2 = (2.0 * n - 1.0) * inverse * psi_1 - 1.0
+        psi_3 = (2.0 * n - 3.0) * inverse * psi_2 - psi_1
+        psi_4 = (2.0 * n - 5.0) * inverse * psi_3 - psi_2
+        out[n - 1] = _quotient(one, psi_1)
+        out[n - 2] = _quotient(psi_1, psi_2)
+        out[n - 3] = _quotient(psi_2, psi_3)
+        ratio = _quotient(psi_3, psi_4)
+        out[n - 4] = ratio
+        n -= 4
+    for k in range(n, first, -1):
+        ratio = _quotient(one, (2.0 * k + 1.0) * inverse - ratio)
+        out[k - 1] = ratio
+
+
+@_kernel
+def _quotient(a: Any, b: Any) -> Any:
+    """``a / b`` for real and complex numbers, without branches; a zero ``b`` gives a huge number."""
+    b = b + 1e-60
+    return a * np.conj(b) * (1.0 / (b.real * b.real + b.imag * b.imag))
 
 
 @_kernel
@@ -154,39 +177,36 @@ def _sum_coefficients(x: float, a: ComplexArray, b: ComplexArray) -> tuple[float
 
 
 @_kernel
-def efficiencies_of_one(x: float, m: Any) -> tuple[float, float, float, float]:
-    """Return Q_sca, Q_abs, Q_back and g of one sphere; ``m`` a float or n - ik with k >= 0."""
+def efficiencies_of_one(x: float, m: Any) -> tuple[float, float, float, float, float]:
+    """Return Q_ext, Q_sca, Q_abs, Q_back and g of one sphere; ``m`` a float or n - ik with k >= 0."""
     if m == 1.0:
-        return 0.0, 0.0, 0.0, 0.0
+        return 0.0, 0.0, 0.0, 0.0, 0.0
     terms = number_of_terms(x)
     a, b = np.empty(terms, np.complex128), np.empty(terms, np.complex128)
     scattered, absorbed = fill_coefficients(x, m, a, b)
     forward, backward = _sum_coefficients(x, a, b)
-    return scattered, absorbed, backward, forward / scattered
+    return scattered + absorbed, scattered, absorbed, backward, forward / scattered
 
 
 @_kernel
 def efficiencies_of_many(x: Array, m: ComplexArray) -> Array:
-    """Return Q_sca, Q_abs, Q_back and g of every sphere, shape (4, count)."""
-    out = np.empty((4, x.size))
+    """Return Q_ext, Q_sca, Q_abs, Q_back and g of every sphere, shape (5, count)."""
+    out = np.empty((5, x.size))
     for i in range(x.size):
-        if m[i].imag == 0.0:
-            out[0, i], out[1, i], out[2, i], out[3, i] = efficiencies_of_one(x[i], m[i].real)
-        else:
-            out[0, i], out[1, i], out[2, i], out[3, i] = efficiencies_of_one(x[i], m[i])
+        one = efficiencies_of_one(x[i], m[i].real) if m[i].imag == 0.0 else efficiencies_of_one(x[i], m[i])
+        out[0, i], out[1, i], out[2, i], out[3, i], out[4, i] = one
     return out
 
 
 @_kernel
-def _angular_sums(a: ComplexArray, b: ComplexArray, mu: Array, sums: Array) -> None:
+def _angular_sums(a: ComplexArray, b: ComplexArray, work: Array) -> None:
     """Add up S1 + S2 and S1 - S2 at the angles of one block, orders outside and angles inside.
 
-    ``sums`` (4, angles) receives the real and imaginary parts of both. Two orders are done in one pass,
-    which halves the traffic of the six arrays that a pass reads and writes.
+    ``work`` holds seven rows of `_BLOCK` numbers one behind the other: mu, pi_{n-1}, pi_n (to begin
+    with 0 and 1), then the real and imaginary parts of both sums (to begin with 0). In one array at
+    constant distances the rows are seen not to overlap, which lets the inner loop vectorise: 4 times
+    faster than with seven arrays. Two orders in one pass halve the traffic.
     """
-    angles = mu.size
-    pi_before, pi = np.zeros(angles), np.ones(angles)
-    plus_real, plus_imag, minus_real, minus_imag = sums[0], sums[1], sums[2], sums[3]
     for first in range(1, a.size + 1, 2):
         n = float(first)
         second = first < a.size
@@ -199,41 +219,43 @@ def _angular_sums(a: ComplexArray, b: ComplexArray, mu: Array, sums: Array) -> N
         p_r, p_i, m_r, m_i = plus.real, plus.imag, minus.real, minus.imag
         p_r2, p_i2, m_r2, m_i2 = plus_2.real, plus_2.imag, minus_2.real, minus_2.imag
         step, step_2 = (n + 1.0) / n, (n + 2.0) / (n + 1.0)
-        for j in range(angles):
-            pi_1 = pi[j]
-            s = mu[j] * pi_1
-            t = s - pi_before[j]
-            tau_1 = n * t - pi_before[j]
+        for j in range(_BLOCK):
+            mu, pi_0, pi_1 = work[j], work[j + _BLOCK], work[j + 2 * _BLOCK]
+            s = mu * pi_1
+            t = s - pi_0
+            tau_1 = n * t - pi_0
             pi_2 = s + step * t
-            s = mu[j] * pi_2
+            s = mu * pi_2
             t = s - pi_1
             tau_2 = (n + 1.0) * t - pi_1
-            pi_before[j] = pi_2
-            pi[j] = s + step_2 * t
+            work[j + _BLOCK] = pi_2
+            work[j + 2 * _BLOCK] = s + step_2 * t
             sum_1, difference_1 = pi_1 + tau_1, pi_1 - tau_1
             sum_2, difference_2 = pi_2 + tau_2, pi_2 - tau_2
-            plus_real[j] += p_r * sum_1 + p_r2 * sum_2
-            plus_imag[j] += p_i * sum_1 + p_i2 * sum_2
-            minus_real[j] += m_r * difference_1 + m_r2 * difference_2
-            minus_imag[j] += m_i * difference_1 + m_i2 * difference_2
+            work[j + 3 * _BLOCK] += p_r * sum_1 + p_r2 * sum_2
+            work[j + 4 * _BLOCK] += p_i * sum_1 + p_i2 * sum_2
+            work[j + 5 * _BLOCK] += m_r * difference_1 + m_r2 * difference_2
+            work[j + 6 * _BLOCK] += m_i * difference_1 + m_i2 * difference_2
 
 
 @_kernel
 def amplitudes_from(a: ComplexArray, b: ComplexArray, mu: Array) -> tuple[ComplexArray, ComplexArray]:
     """Return S1 and S2 at the cosines ``mu`` from the coefficients."""
     s1, s2 = np.empty(mu.size, np.complex128), np.empty(mu.size, np.complex128)
-    sums = np.empty((4, _BLOCK))
+    work = np.empty(7 * _BLOCK)
     for start in range(0, mu.size, _BLOCK):
-        block = mu[start : start + _BLOCK]
-        part = sums[:, : block.size]
-        part[:] = 0.0
-        _angular_sums(a, b, block, part)
-        for j in range(block.size):
-            plus, minus = complex(part[0, j], part[1, j]), complex(part[2, j], part[3, j])
+        count = min(_BLOCK, mu.size - start)
+        work[:] = 0.0
+        work[:count] = mu[start : start + count]
+        work[2 * _BLOCK : 3 * _BLOCK] = 1.0
+        _angular_sums(a, b, work)
+        for j in range(count):
+            plus = complex(work[j + 3 * _BLOCK], work[j + 4 * _BLOCK])
+            minus = complex(work[j + 5 * _BLOCK], work[j + 6 * _BLOCK])
             s1[start + j] = 0.5 * (plus + minus)
             s2[start + j] = 0.5 * (plus - minus)
-            if abs(block[j]) == 1.0:  # there the recurrence of pi_n only loses digits
-                s1[start + j], s2[start + j] = _amplitudes_on_axis(a, b, block[j])
+            if abs(work[j]) == 1.0:  # there the recurrence of pi_n only loses digits
+                s1[start + j], s2[start + j] = _amplitudes_on_axis(a, b, work[j])
     return s1, s2
 
 
