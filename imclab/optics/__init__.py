@@ -9,9 +9,9 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from imclab.optics import fresnel, phase, phase_table, surface
+    from imclab.optics import fresnel, metals, mie, phase, phase_table, size_distribution, surface, water
 
-__all__ = ["fresnel", "phase", "phase_table", "surface"]
+__all__ = ["fresnel", "metals", "mie", "phase", "phase_table", "size_distribution", "surface", "water"]
 
 
 def __getattr__(name: str) -> Any:

@@ -69,9 +69,9 @@ def efficiencies(x: ArrayLike, m: ArrayLike) -> Efficiencies:
     if isinstance(x, float) and isinstance(m, (float, complex)) and _allowed(x, m):
         return Efficiencies._make(mie_kernels.efficiencies_of_one(x, _simplest(m)))
     sizes, index = _checked(x, m)
-    sizes, index = np.broadcast_arrays(sizes, index)
-    values = mie_kernels.efficiencies_of_many(sizes.ravel(), index.ravel())
-    return Efficiencies(*values.reshape(5, *sizes.shape))
+    shape = np.broadcast_shapes(sizes.shape, index.shape)
+    spheres = np.array(np.broadcast_to(sizes, shape)).ravel(), np.array(np.broadcast_to(index, shape)).ravel()
+    return Efficiencies(*mie_kernels.efficiencies_of_many(*spheres).reshape(5, *shape))
 
 
 def amplitudes(x: ArrayLike, m: ArrayLike, mu: ArrayLike) -> tuple[ComplexArray, ComplexArray]:
@@ -128,6 +128,26 @@ def phase_function(x: ArrayLike, m: ArrayLike, mu: ArrayLike) -> Array:
     scattering = efficiencies(sizes, index).scattering
     intensity = s1.real**2 + s1.imag**2 + s2.real**2 + s2.imag**2
     return np.asarray(intensity / (2.0 * np.pi * sizes**2 * scattering))
+
+
+def mean_intensity(x: ArrayLike, m: complex, mu: ArrayLike, *, weights: ArrayLike) -> Array:
+    """Return the sum of ``|S1|**2 + |S2|**2`` over spheres of one index, each with its weight.
+
+    Parameters
+    ----------
+    x, weights : array_like, shape (sizes,)
+        Size parameters and weights.
+    m : complex
+        Relative index.
+    mu : array_like, shape (angles,)
+        Cosines of the scattering angle.
+    """
+    sizes, index = _checked(x, m)
+    cosines = np.array(mu, dtype=np.float64).ravel()
+    check("mu", cosines, -1.0, 1.0, unit="(cosine of the scattering angle)")
+    share = np.array(weights, dtype=np.float64).ravel()
+    values = mie_kernels.mean_intensity_of_many(sizes.ravel(), _simplest(index.item()), share, cosines)
+    return np.asarray(values)
 
 
 def _checked(x: ArrayLike, m: ArrayLike) -> tuple[Array, ComplexArray]:

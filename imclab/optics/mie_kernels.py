@@ -280,3 +280,36 @@ def amplitudes_of_one(x: float, m: Any, mu: Array) -> tuple[ComplexArray, Comple
     if terms > 0:
         fill_coefficients(x, m, a, b)
     return amplitudes_from(a, b, mu)
+
+
+@_kernel
+def mean_intensity_of_many(x: Array, m: Any, weights: Array, mu: Array) -> Array:
+    """Return the weighted sum over spheres of ``|S1|**2 + |S2|**2`` at the cosines ``mu``."""
+    total = np.zeros(mu.size)
+    for i in range(x.size):
+        s1, s2 = amplitudes_of_one(x[i], m, mu)
+        for j in range(mu.size):
+            one, two = s1[j], s2[j]
+            square = one.real * one.real + one.imag * one.imag + two.real * two.real + two.imag * two.imag
+            total[j] += weights[i] * square
+    return total
+
+
+@_kernel
+def chebyshev_sum(coefficients: Array, mu: Array) -> Array:
+    """Return the Chebyshev series at the points ``mu`` by Clenshaw's recurrence, block by block."""
+    out = np.empty(mu.size)
+    work = np.empty(3 * _BLOCK)  # mu, and the two latest terms of the recurrence
+    for start in range(0, mu.size, _BLOCK):
+        count = min(_BLOCK, mu.size - start)
+        work[:] = 0.0
+        work[:count] = mu[start : start + count]
+        for order in range(coefficients.size - 1, 0, -1):
+            coefficient = coefficients[order]
+            for j in range(_BLOCK):
+                latest = work[j + _BLOCK]
+                work[j + _BLOCK] = coefficient + 2.0 * work[j] * latest - work[j + 2 * _BLOCK]
+                work[j + 2 * _BLOCK] = latest
+        for j in range(count):
+            out[start + j] = coefficients[0] + work[j] * work[j + _BLOCK] - work[j + 2 * _BLOCK]
+    return out

@@ -67,8 +67,8 @@ def absorption(
 
     Notes
     -----
-    Linear in wavelength between the table's 2 nm (2.5 nm); the error of that is far below the
-    uncertainty of the data (3 % at 532 nm).
+    Linear in wavelength between the table's 2 nm (2.5 nm). Leaving out every other row moves it by at
+    most 2 % (4 %) from 450 to 650 nm, so the interpolation itself is good to about 1 %.
     """
     if source == "pope-fry":
         nm = _nanometres(wavelength, 380.0, 727.5)
@@ -95,14 +95,14 @@ def scattering(wavelength: ArrayLike, *, salinity: float = 0.0) -> Array:
     Parameters
     ----------
     wavelength : array_like
-        In m, 380 to 700 nm.
+        In m, 380 to 730 nm.
     salinity : float
         In g/kg, 0 to 38.4.
 
     Notes
     -----
-    Tabulated from Zhang, Hu & He 2009; power law between the wavelengths (error below 1e-5), linear
-    between the salinities 0, 35 and 38.4 (error below 1 %). Between 0 and 30 deg C the true value moves
+    Tabulated from Zhang, Hu & He 2009; power law between the wavelengths (error below 1e-4), linear
+    between the salinities 0, 35 and 38.4 (error below 0.5 %). Between 0 and 30 deg C the true value moves
     by a few percent, which is not modelled.
     """
     table = "seawater_scattering"
