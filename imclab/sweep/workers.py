@@ -29,8 +29,10 @@ Finished = tuple[Unit, Record | BaseException]
 
 MOST_DEATHS = 2
 """A unit whose worker has died so often is listed as failed: it is likely to be the cause."""
-SECONDS_FOR_CLUSTER = 20
-"""How long the scheduler, and then its first worker, may take to answer."""
+SECONDS_FOR_SCHEDULER = 5
+"""How long the scheduler may take to answer."""
+SECONDS_FOR_WORKER = 30
+"""How long its first worker may take to appear."""
 
 
 class WorkerDiedError(ImclabError, RuntimeError):
@@ -163,7 +165,7 @@ def on_cluster(units: Iterable[Unit], work: Work, *, address: str) -> Generator[
         advice = 'Install it with: python -m pip install "imclab[cluster]"'
         raise InputError("--dask", [Fault("dask", "not installed", "dask and distributed", advice)]) from None
     try:
-        client = distributed.Client(address, timeout=SECONDS_FOR_CLUSTER, set_as_default=False)
+        client = distributed.Client(address, timeout=SECONDS_FOR_SCHEDULER, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as error:
         came = f"{address}, where no scheduler answers ({type(error).__name__})"
         wanted = "the address of a running scheduler, for example tcp://127.0.0.1:8786"
@@ -176,14 +178,14 @@ def on_cluster(units: Iterable[Unit], work: Work, *, address: str) -> Generator[
             client.submit(work, unit, 1, key=f"imclab-{unit.key}-{os.getpid()}", pure=False): unit
             for unit in units
         }
-        for future in distributed.as_completed(list(futures)):
+        for future in distributed.as_completed(list(futures), loop=client.loop):
             failure = future.exception()
             yield futures.pop(future), future.result() if failure is None else failure
 
 
 def _check_workers(client: Any, address: str) -> None:
     try:
-        client.wait_for_workers(1, timeout=SECONDS_FOR_CLUSTER)
+        client.wait_for_workers(1, timeout=SECONDS_FOR_WORKER)
     except TimeoutError:
         advice = f"Start one with: dask worker {address}"
         raise InputError("--dask", [Fault(address, "no worker", "at least one worker", advice)]) from None
