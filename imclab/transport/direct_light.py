@@ -1,0 +1,169 @@
+"""What is computed instead of sampled: the unscattered light on the target and in the picture.
+
+Integrals over the laser's spot use Gauss-Hermite points, those over the aperture a product rule for
+the disc, those over a cell of the picture 2 × 2 Gauss points.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imclab.transport.beam_field import beam_irradiance
+from imclab.transport.gathering import gate_share, time_bin
+from imclab.transport.kernel_cache import cached_kernel, device
+from imclab.transport.light_walk import diffuse_albedo
+from imclab.transport.setup import Setup
+
+FloatArray = NDArray[np.float64]
+
+_GAUSS_2 = 0.5 / math.sqrt(3.0)
+
+
+class Rules(NamedTuple):
+    """Quadrature points: of the spot (standard normal) and of the aperture (metres), with weights."""
+
+    spot: FloatArray
+    spot_weights: FloatArray
+    aperture: FloatArray
+    aperture_weights: FloatArray
+
+
+class DirectLight(NamedTuple):
+    """Unscattered light, per joule of pulse.
+
+    Attributes
+    ----------
+    lit : array (2 materials, rows, columns)
+        Irradiance of the target times diffuse albedo, 1/m².
+    time : array (rows, columns)
+        When it arrives there, s.
+    reach : array (rows, columns)
+        Energy that the aperture gathers unscattered from a cell of unit radiance, m² sr.
+    return_time : array (rows, columns)
+        How long that takes, s.
+    picture : array (rows, columns)
+        Gated energy of each cell, unscattered both ways.
+    times : array (impulse bins)
+        The same, before the gate, by time of arrival.
+    """
+
+    lit: FloatArray
+    time: FloatArray
+    reach: FloatArray
+    return_time: FloatArray
+    picture: FloatArray
+    times: FloatArray
+
+
+def disc_rule(radius: float, radial: int, around: int) -> tuple[FloatArray, FloatArray]:
+    """Return points (n, 2) and weights (n) that integrate over a disc: Gauss in r², even in angle."""
+    nodes, weights = np.polynomial.legendre.leggauss(radial)
+    radii = radius * np.sqrt(0.5 * (nodes + 1.0))
+    angles = 2.0 * np.pi * (np.arange(around) + 0.5) / around
+    points = np.stack([np.outer(radii, np.cos(angles)), np.outer(radii, np.sin(angles))], axis=-1)
+    areas = np.repeat(0.5 * weights * np.pi * radius * radius / around, around)
+    return np.ascontiguousarray(points.reshape(-1, 2)), areas
+
+
+def rules_for(setup: Setup) -> Rules:
+    """Choose rules fine enough for the scene's spot and aperture."""
+    spread = setup.target.distance * setup.beam.divergence_sigma
+    order = 3 if setup.beam.spot_sigma < 0.05 * spread else 9
+    nodes, weights = np.polynomial.hermite_e.hermegauss(order)
+    weights = weights / weights.sum()
+    grid_x, grid_y = np.meshgrid(nodes, nodes)
+    spot = np.stack([grid_x.ravel(), grid_y.ravel()], axis=-1)
+    receiver = setup.receiver
+    small = receiver.radius < 0.03 * (setup.target.distance - receiver.z)
+    unlimited = receiver.cos_half_view < 0.1
+    aperture, areas = disc_rule(receiver.radius, *((2, 5) if small and unlimited else (8, 17)))
+    return Rules(np.ascontiguousarray(spot), np.outer(weights, weights).ravel(), aperture, areas)
+
+
+@cached_kernel
+def direct_light(setup: Any, rules: Rules, coverage: Any) -> DirectLight:
+    """Compute the unscattered light for a grid of cells over the target, of which a share is figure."""
+    rows, columns = coverage.shape
+    lit = np.zeros((2, rows, columns))
+    time, reach = np.zeros((rows, columns)), np.zeros((rows, columns))
+    return_time, picture = np.zeros((rows, columns)), np.zeros((rows, columns))
+    times = np.zeros(setup.time.bins)
+    target = setup.target
+    cell = 4.0 * target.half_width * target.half_height / (rows * columns)
+    for row in range(rows):
+        for column in range(columns):
+            for corner in range(4):
+                inside_x = 0.5 + _GAUSS_2 * (2 * (corner % 2) - 1)
+                inside_y = 0.5 + _GAUSS_2 * (2 * (corner // 2) - 1)
+                x = (2.0 * (column + inside_x) / columns - 1.0) * target.half_width
+                y = (2.0 * (row + inside_y) / rows - 1.0) * target.half_height
+                figure, ground, arrival = _irradiance(setup, rules, x, y)
+                lit[0, row, column] += 0.25 * figure
+                lit[1, row, column] += 0.25 * ground
+                time[row, column] += 0.25 * arrival
+                seen, back, gated = _gathered(setup, rules, x, y, arrival)
+                reach[row, column] += 0.25 * cell * seen
+                return_time[row, column] += 0.25 * back
+                radiance = ground + coverage[row, column] * (figure - ground)
+                radiance *= 0.25 * cell / math.pi
+                picture[row, column] += radiance * gated
+                bin_ = time_bin(setup.time, arrival + back)
+                if bin_ >= 0:
+                    times[bin_] += radiance * seen
+    return DirectLight(lit, time, reach, return_time, picture, times)
+
+
+@device
+def _irradiance(setup: Any, rules: Any, x: Any, y: Any) -> Any:
+    """Return irradiance times diffuse albedo of figure and ground at a point, and the mean time."""
+    target, water, z = setup.target, setup.water, setup.target.distance
+    figure = ground = total = moment = 0.0
+    for i in range(rules.spot.shape[0]):
+        value, direction, way = beam_irradiance(setup.beam, (x, y, z), rules.spot[i, 0], rules.spot[i, 1])
+        value *= rules.spot_weights[i] * direction[2] * math.exp(-water.attenuation * way)
+        figure += value * diffuse_albedo(target.figure, direction[2])
+        ground += value * diffuse_albedo(target.ground, direction[2])
+        total += value
+        moment += value * way
+    mean_way = moment / total if total > 0.0 else math.sqrt(x * x + y * y + z * z)
+    return figure, ground, mean_way / water.group_velocity
+
+
+@device
+def _gathered(setup: Any, rules: Any, x: Any, y: Any, arrival: Any) -> Any:
+    """Return the aperture's integral for a point of unit radiance, its mean time, the gated integral."""
+    receiver, water = setup.receiver, setup.water
+    depth = setup.target.distance - receiver.z
+    seen = moment = gated = 0.0
+    for i in range(rules.aperture.shape[0]):
+        dx = x - receiver.x - rules.aperture[i, 0]
+        dy = y - receiver.y - rules.aperture[i, 1]
+        square = dx * dx + dy * dy + depth * depth
+        way = math.sqrt(square)
+        if depth < receiver.cos_half_view * way:
+            continue
+        value = rules.aperture_weights[i] * depth * depth / (square * square)
+        value *= math.exp(-water.attenuation * way)
+        seen += value
+        moment += value * way
+        gated += value * gate_share(setup.gate, arrival + way / water.group_velocity)
+    straight = math.sqrt((x - receiver.x) ** 2 + (y - receiver.y) ** 2 + depth * depth)
+    mean_way = moment / seen if seen > 0.0 else straight
+    return seen, mean_way / water.group_velocity, gated
+
+
+def coverage_of(mask: NDArray[np.uint8], rows: int, columns: int) -> FloatArray:
+    """Return the share of figure in each cell of a grid laid over the mask, exact for any sizes."""
+    shares = _overlap(rows, mask.shape[0]) @ mask.astype(np.float64) @ _overlap(columns, mask.shape[1]).T
+    return np.ascontiguousarray(np.clip(shares, 0.0, 1.0))
+
+
+def _overlap(cells: int, pixels: int) -> FloatArray:
+    cell, pixel = np.arange(cells)[:, None], np.arange(pixels)[None, :]
+    high = np.minimum((cell + 1) * pixels / cells, pixel + 1)
+    low = np.maximum(cell * pixels / cells, pixel)
+    return np.asarray(np.clip(high - low, 0.0, None) * cells / pixels)

@@ -1,0 +1,229 @@
+"""Walks from the laser: the scattered light that falls on the target, as maps ready for the gate.
+
+Light that has not met the target is symmetric about the beam's axis, so it is tallied in rings; the
+little that has met it before, and comes back to it from the water, is tallied on a coarse grid. Each
+map holds, for every camera time of `MapAxes.times`, the share that passes the gate when the way from
+the target to the camera takes that long.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imclab.optics.surface import MICROFACET
+from imclab.transport.analog import surface_at
+from imclab.transport.gathering import gate_share
+from imclab.transport.kernel_cache import cached_kernel, device
+from imclab.transport.random import uniforms
+from imclab.transport.scattering import sample_deviation, turn
+from imclab.transport.surfaces import cosine_law_reflectance
+from imclab.transport.surfaces import sample as sample_surface
+
+FloatArray = NDArray[np.float64]
+
+LIGHT_STREAM = 11
+ROULETTE_WEIGHT = 0.02
+ROULETTE_CHANCE = 0.2
+REFLECTED_FIRST = 0.1
+"""Share of walks that begin with light reflected by the target before it met the water."""
+MOST_EVENTS = 100_000
+
+
+class MapAxes(NamedTuple):
+    """Where the maps of light on the target have their nodes.
+
+    Attributes
+    ----------
+    radii : array (rings)
+        Radii of the tent functions of the ring map, m; the first is 0.
+    ring_areas : array (rings)
+        Integral of each tent function over the plane, m².
+    times : array (times)
+        Camera times, s; a single one when there is no gate.
+    cells : int
+        Cells along each side of the coarse grid.
+    impulse_width, impulse_bins : float, int
+        Step (s) and number of the times of arrival on the target, from 0; none without a histogram.
+    """
+
+    radii: FloatArray
+    ring_areas: FloatArray
+    times: FloatArray
+    cells: int
+    impulse_width: float
+    impulse_bins: int
+
+
+class LightMaps(NamedTuple):
+    """Irradiance of the target times diffuse albedo, 1/m² per packet, for each of two materials.
+
+    Attributes
+    ----------
+    rings : array (2, times, rings)
+        Light that has not met the target, gated for each camera time.
+    grid : array (2, times, cells, cells)
+        Light that has met it, gated likewise.
+    impulses : array (2, impulse bins, rings)
+        Both, before the gate, by time of arrival on the target.
+    """
+
+    rings: FloatArray
+    grid: FloatArray
+    impulses: FloatArray
+
+
+@device
+def diffuse_albedo(surface: Any, cos_in: Any) -> Any:
+    """Return the share of light that leaves with the same radiance everywhere; 0 for a glossy surface."""
+    if surface.kind == MICROFACET:
+        return 0.0
+    return cosine_law_reflectance(surface, min(cos_in, 1.0))
+
+
+@device
+def launch(beam: Any, seed: Any, history: Any) -> Any:
+    """Draw start and direction of a packet (eqs. 1, 2)."""
+    u0, u1, u2, u3 = uniforms(seed, history, 0, LIGHT_STREAM)
+    radius = beam.spot_sigma * math.sqrt(-2.0 * math.log(u0))
+    polar = min(beam.divergence_sigma * math.sqrt(-2.0 * math.log(u1)), math.pi)
+    place, azimuth = 2.0 * math.pi * u2, 2.0 * math.pi * u3
+    sine = math.sin(polar)
+    direction = (sine * math.cos(azimuth), sine * math.sin(azimuth), math.cos(polar))
+    return (radius * math.cos(place), radius * math.sin(place), 0.0), direction
+
+
+@device
+def ring_of(radii: Any, radius: Any) -> Any:
+    """Return the ring inside a radius and how far (0 to 1) the radius lies toward the next."""
+    ring = min(np.searchsorted(radii, radius, side="right"), radii.shape[0] - 1) - 1
+    return ring, (radius - radii[ring]) / (radii[ring + 1] - radii[ring])
+
+
+@device
+def _score(setup: Any, axes: Any, maps: Any, touched: bool, place: Any, energy: Any, time: Any) -> None:
+    """Enter light that lands at a place (x, y) of the target's plane at a time into the maps."""
+    target, gate = setup.target, setup.gate
+    x, y = place
+    inside = abs(x) < target.half_width and abs(y) < target.half_height
+    radius = math.sqrt(x * x + y * y)
+    if radius >= axes.radii[-1] or (touched and not inside):
+        return
+    ring, outer = ring_of(axes.radii, radius)
+    inner_area, outer_area = (1.0 - outer) / axes.ring_areas[ring], outer / axes.ring_areas[ring + 1]
+    if touched:
+        row = int((y / target.half_height + 1.0) * 0.5 * axes.cells)
+        column = int((x / target.half_width + 1.0) * 0.5 * axes.cells)
+        cell = 4.0 * target.half_width * target.half_height / (axes.cells * axes.cells)
+        for n in range(axes.times.shape[0]):
+            share = gate_share(gate, time + axes.times[n]) / cell
+            maps.grid[0, n, row, column] += energy[0] * share
+            maps.grid[1, n, row, column] += energy[1] * share
+    else:
+        for n in range(axes.times.shape[0]):
+            share = gate_share(gate, time + axes.times[n])
+            for material in range(2):
+                maps.rings[material, n, ring] += energy[material] * share * inner_area
+                maps.rings[material, n, ring + 1] += energy[material] * share * outer_area
+    if axes.impulse_bins > 0 and time < axes.impulse_width * (axes.impulse_bins - 1):
+        bin_ = int(time / axes.impulse_width)
+        later = time / axes.impulse_width - bin_
+        for material in range(2):
+            early, late = energy[material] * (1.0 - later), energy[material] * later
+            maps.impulses[material, bin_, ring] += early * inner_area
+            maps.impulses[material, bin_, ring + 1] += early * outer_area
+            maps.impulses[material, bin_ + 1, ring] += late * inner_area
+            maps.impulses[material, bin_ + 1, ring + 1] += late * outer_area
+
+
+@device
+def _scale(maps: Any, factor: Any) -> None:
+    for material in range(2):
+        maps.rings[material] *= factor
+        maps.grid[material] *= factor
+        maps.impulses[material] *= factor
+
+
+@cached_kernel
+def light_walks(setup: Any, axes: MapAxes, latest: float, seed: Any, first: Any, count: int) -> LightMaps:
+    """Walk ``count`` packets and return the maps of scattered light on the target, per packet.
+
+    The unscattered light on the target is left out: it is computed. Walks therefore begin with a
+    collision forced before the target, or (the share `REFLECTED_FIRST`) with a reflection. After every
+    collision the chance of reaching the target unscattered is scored. A walk ends when it leaves, when
+    it can no longer land by ``latest`` (s), or by Russian roulette.
+    """
+    water, target = setup.water, setup.target
+    rings, times = axes.radii.shape[0], axes.times.shape[0]
+    maps = LightMaps(
+        np.zeros((2, times, rings)),
+        np.zeros((2, times, axes.cells, axes.cells)),
+        np.zeros((2, axes.impulse_bins, rings)),
+    )
+    mean_free_path = 1.0 / max(water.attenuation, 1e-30)
+    farthest = latest * water.group_velocity
+    for i in range(count):
+        history = first + np.uint64(i)
+        (x, y, z), direction = launch(setup.beam, seed, history)
+        if direction[2] <= 0.0:
+            continue
+        way = target.distance / direction[2]
+        through = math.exp(-water.attenuation * way)
+        choice, u_free, u_scatter, u_azimuth = uniforms(seed, history, 1, LIGHT_STREAM)
+        path, touched = 0.0, False
+        at_target = choice < REFLECTED_FIRST
+        if at_target:
+            weight, free = through / REFLECTED_FIRST, way
+        else:
+            weight = (1.0 - through) / (1.0 - REFLECTED_FIRST)
+            free = -math.log1p(-u_free * (1.0 - through)) * mean_free_path
+        for event in range(2, MOST_EVENTS):
+            x, y, z = x + free * direction[0], y + free * direction[1], z + free * direction[2]
+            path += free
+            if at_target:
+                z = target.distance
+                if abs(x) >= target.half_width or abs(y) >= target.half_height:
+                    break
+                surface = surface_at(target, (x, y))
+                arriving = (-direction[0], -direction[1], direction[2])
+                leaving, factor = sample_surface(surface, arriving, u_scatter, u_azimuth)
+                direction = (leaving[0], leaving[1], -leaving[2])
+                weight *= factor
+                touched = True
+            else:
+                weight *= water.albedo
+                angle = 2.0 * math.pi * u_azimuth
+                deviation = sample_deviation(setup.phase, u_scatter)
+                direction = turn(direction, deviation, math.sin(angle), math.cos(angle))
+            if weight < ROULETTE_WEIGHT:
+                dice, _, _, _ = uniforms(seed, history, event, LIGHT_STREAM + 1)
+                if weight == 0.0 or dice > ROULETTE_CHANCE:
+                    break
+                weight /= ROULETTE_CHANCE
+            way = 1e30
+            if direction[2] > 0.0:
+                way = (target.distance - z) / direction[2]
+                if path + way > farthest:
+                    break
+                arriving_weight = weight * math.exp(-water.attenuation * way)
+                figure = arriving_weight * diffuse_albedo(target.figure, direction[2])
+                ground = arriving_weight * diffuse_albedo(target.ground, direction[2])
+                place = (x + way * direction[0], y + way * direction[1])
+                time = (path + way) / water.group_velocity
+                _score(setup, axes, maps, touched, place, (figure, ground), time)
+            elif direction[2] < 0.0:
+                way = -z / direction[2]
+                if path + (target.distance - z) > farthest:
+                    break
+            _, u_free, u_scatter, u_azimuth = uniforms(seed, history, event, LIGHT_STREAM)
+            free = -math.log(u_free) * mean_free_path
+            at_target = free >= way
+            if at_target:
+                if direction[2] < 0.0:
+                    break
+                free = way
+    _scale(maps, 1.0 / max(count, 1))
+    return maps
