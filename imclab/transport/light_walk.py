@@ -139,17 +139,9 @@ def _score(setup: Any, axes: Any, maps: Any, touched: bool, place: Any, energy: 
             maps.impulses[material, bin_ + 1, ring + 1] += late * outer_area
 
 
-@device
-def _scale(maps: Any, factor: Any) -> None:
-    for material in range(2):
-        maps.rings[material] *= factor
-        maps.grid[material] *= factor
-        maps.impulses[material] *= factor
-
-
 @cached_kernel
 def light_walks(setup: Any, axes: MapAxes, latest: float, seed: Any, first: Any, count: int) -> LightMaps:
-    """Walk ``count`` packets and return the maps of scattered light on the target, per packet.
+    """Walk ``count`` packets and return the maps of scattered light on the target, summed.
 
     The unscattered light on the target is left out: it is computed. Walks therefore begin with a
     collision forced before the target, or (the share `REFLECTED_FIRST`) with a reflection. After every
@@ -225,5 +217,4 @@ def light_walks(setup: Any, axes: MapAxes, latest: float, seed: Any, first: Any,
                 if direction[2] < 0.0:
                     break
                 free = way
-    _scale(maps, 1.0 / max(count, 1))
     return maps

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from imclab.transport.backscatter_walk import backscatter_walks
 from imclab.transport.camera_walk import camera_walks
 from imclab.transport.direct_light import DirectLight, coverage_of, direct_light, rules_for
-from imclab.transport.light_walk import MapAxes, light_walks
+from imclab.transport.light_walk import LightMaps, MapAxes, light_walks
 from imclab.transport.runner import Estimator, Tally
 from imclab.transport.setup import PULSE_REACH, Setup
 from imclab.transport.target_radiance import gate_table, gated_radiance, map_axes
@@ -55,7 +55,8 @@ def make(setup: Setup) -> Estimator:
         times = np.zeros(setup.time.bins)
         if scatters:
             run = (np.uint64(seed), np.uint64(first_history), count)
-            maps = light_walks(setup, axes, latest, *run)
+            sums = light_walks(setup, axes, latest, *run)
+            maps = LightMaps(*(array / max(count, 1) for array in sums))
             radiance, seen = gated_radiance(setup, axes, table, direct, coverage, maps)
             camera = camera_walks(setup, axes, direct, coverage, radiance, ROW_STEP, *run)
             picture = count * seen + camera.picture
