@@ -15,6 +15,7 @@ import typer
 
 import imclab
 from imclab.commands.calibrate import calibrate
+from imclab.commands.particles import particles
 from imclab.commands.sweep import sweep
 from imclab.commands.twin import twin
 
@@ -44,6 +45,7 @@ def _root(
 
 
 app.command("calibrate")(calibrate)
+app.command("particles")(particles)
 app.command("twin")(twin)
 app.command("sweep")(sweep)
 

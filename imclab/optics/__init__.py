@@ -9,9 +9,29 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from imclab.optics import fresnel, metals, mie, phase, phase_table, size_distribution, surface, water
+    from imclab.optics import (
+        fresnel,
+        metals,
+        mie,
+        particles,
+        phase,
+        phase_table,
+        size_distribution,
+        surface,
+        water,
+    )
 
-__all__ = ["fresnel", "metals", "mie", "phase", "phase_table", "size_distribution", "surface", "water"]
+__all__ = [
+    "fresnel",
+    "metals",
+    "mie",
+    "particles",
+    "phase",
+    "phase_table",
+    "size_distribution",
+    "surface",
+    "water",
+]
 
 
 def __getattr__(name: str) -> Any:

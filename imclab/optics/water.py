@@ -178,7 +178,7 @@ class WaterType:
     Attributes
     ----------
     name : str
-        Jerlov's type: I, IA, IB, II, III (ocean), 1C, 3C, 5C, 7C, 9C (coast).
+        "pure water", or Jerlov's type: I, IA, IB, II, III (ocean), 1C, 3C, 5C, 7C, 9C (coast).
     source : str
         Where the coefficients come from.
     absorption, scattering : float
@@ -202,6 +202,18 @@ class WaterType:
     def albedo(self) -> float:
         """``b / c``."""
         return self.scattering / self.attenuation
+
+
+def pure_water(
+    wavelength: float, *, temperature: float = ROOM_TEMPERATURE, salinity: float = 0.0
+) -> WaterType:
+    """Return water with nothing in it but salt: `absorption` (WOPP) and `scattering` together."""
+    return WaterType(
+        name="pure water",
+        source="WOPP v3; Zhang, Hu & He 2009",
+        absorption=float(absorption(wavelength, temperature=temperature, salinity=salinity)),
+        scattering=float(scattering(wavelength, salinity=salinity)),
+    )
 
 
 JERLOV_SOURCES = {
