@@ -134,4 +134,5 @@ class IntensifiedCamera:
 def _blurred(picture: NDArray[np.float64], fwhm_px: float) -> NDArray[np.float64]:
     if fwhm_px == 0.0:
         return picture
-    return np.asarray(gaussian_filter(picture, fwhm_px / FWHM_PER_SIGMA, mode="constant", truncate=5.0))
+    # Beyond the sensor the scene goes on: what leaves over the edge comes in from the neighbours.
+    return np.asarray(gaussian_filter(picture, fwhm_px / FWHM_PER_SIGMA, mode="nearest", truncate=5.0))

@@ -21,16 +21,39 @@ Effects = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Estimate:
-    """A value with its standard uncertainty."""
+    """A value with its standard uncertainty, known with so many degrees of freedom."""
 
     value: float
     stderr: float
+    dof: float = math.inf
 
     @property
     def interval(self) -> tuple[float, float]:
-        """95 % interval of a normal distribution."""
-        half = COVERAGE_95 * self.stderr
+        """95 % interval by Student's t, which few repeats widen (GUM, annex G)."""
+        half = coverage_factor(self.dof) * self.stderr
         return self.value - half, self.value + half
+
+
+def coverage_factor(dof: float) -> float:
+    """Return how many standard uncertainties hold 95 % on both sides."""
+    from scipy.special import stdtrit
+
+    return float(stdtrit(dof, 0.975)) if math.isfinite(dof) else COVERAGE_95
+
+
+def effective_dof(budget: Mapping[str, float], dof: Mapping[str, float]) -> float:
+    """Return the degrees of freedom of a sum of sources (Welch-Satterthwaite, GUM G.4.1).
+
+    Parameters
+    ----------
+    budget : mapping
+        Standard uncertainty by source.
+    dof : mapping
+        Degrees of freedom by source; infinite for sources that it does not name.
+    """
+    variance = sum(u * u for u in budget.values())
+    spread = sum(u**4 / dof[name] for name, u in budget.items() if name in dof)
+    return variance**2 / spread if spread > 0.0 else math.inf
 
 
 @dataclass(frozen=True)
@@ -45,11 +68,14 @@ class ComparisonError:
         Relative standard uncertainty by source; the sources are independent of one another.
     bound : float
         The claim to be judged; the paper's is 0.30.
+    dof : float
+        Degrees of freedom of u_val.
     """
 
     value: float
     budget: Mapping[str, float]
     bound: float = 0.30
+    dof: float = math.inf
 
     @property
     def u_val(self) -> float:
@@ -75,7 +101,7 @@ class ComparisonError:
     @property
     def verdict(self) -> str:
         """What the numbers say, in one of four ways (V&V 20, section 6)."""
-        if abs(self.value) <= COVERAGE_95 * self.u_val:
+        if abs(self.value) <= coverage_factor(self.dof) * self.u_val:
             return "agrees within its uncertainty"
         if self.probability_inside >= 0.95:
             return "differs, inside the bound"

@@ -34,6 +34,8 @@ FLOORS = {
     "imclab.comparison": 6,
     "imclab.agreement": 7,
     "imclab.sharpness": 7,
+    "imclab.sighting": 7,
+    "imclab.budget": 7,
     "imclab.assessment": 7,
     "imclab.twin": 7,
     "imclab.bench": 7,

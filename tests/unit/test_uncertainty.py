@@ -5,13 +5,25 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.stats import norm
+from scipy.stats import t as student
 
-from imclab.uncertainty import ComparisonError, Estimate, budget, covariance
+from imclab.uncertainty import ComparisonError, Estimate, budget, covariance, effective_dof
 
 
 def test_interval_is_that_of_a_normal_distribution() -> None:
     low, high = Estimate(10.0, 2.0).interval
     assert (low, high) == pytest.approx(norm(10, 2).interval(0.95), rel=1e-12)
+
+
+def test_few_repeats_widen_the_interval() -> None:
+    low, high = Estimate(10.0, 2.0, dof=5).interval
+    assert (low, high) == pytest.approx(student(5, 10, 2).interval(0.95), rel=1e-12)
+
+
+def test_effective_degrees_of_freedom_follow_welch_and_satterthwaite() -> None:
+    assert effective_dof({"a": 0.1}, {"a": 7}) == pytest.approx(7)
+    assert effective_dof({"a": 0.1, "b": 0.1}, {"a": 7, "b": 7}) == pytest.approx(14)
+    assert effective_dof({"a": 0.1}, {}) == np.inf
 
 
 def test_validation_uncertainty_is_the_root_sum_of_squares() -> None:

@@ -1,0 +1,113 @@
+"""Measured against simulated, condition by condition, in joules first and in counts second.
+
+The simulation is warped onto the measured frame; the measurement is never resampled, which would
+smooth its noise and flatter every metric. Bad and saturated pixels are left out of both sides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imclab.registration import Registration
+from imclab.result import Result
+from imclab.uncertainty import ComparisonError, Estimate
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Pair:
+    """One condition, measured and simulated on the same camera pixels.
+
+    Attributes
+    ----------
+    name, gain, optical_depth
+        The condition.
+    frames : int
+        How many frames the measurement is the mean of.
+    measured, measured_stderr : array (rows, columns)
+        Energy per camera pixel, J; NaN where a pixel is bad or saturated.
+    simulated, simulated_stderr : array (rows, columns)
+        Simulated energy per camera pixel, J, times ``throughput``.
+    measured_counts, simulated_counts : array (rows, columns)
+        The same two pictures in counts above dark at this gain.
+    region : bool array (rows, columns)
+        Camera pixels that see the target and are good: all sums and metrics are taken over these.
+    throughput : float
+        Measured over simulated energy at the reference condition: transmission of the optics that
+        the scene does not model. One number for all conditions with the same reference.
+    """
+
+    name: str
+    gain: float
+    optical_depth: float
+    frames: int
+    result: Result
+    registration: Registration
+    measured: FloatArray
+    measured_stderr: FloatArray
+    simulated: FloatArray
+    simulated_stderr: FloatArray
+    measured_counts: FloatArray
+    simulated_counts: FloatArray
+    region: NDArray[np.bool_]
+    throughput: Estimate
+
+    @property
+    def z_map(self) -> FloatArray:
+        """Difference simulated - measured over its standard uncertainty, pixel by pixel."""
+        spread = np.hypot(self.measured_stderr, self.simulated_stderr)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.asarray(np.where(self.region, (self.simulated - self.measured) / spread, np.nan))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """What the comparison says of one condition.
+
+    Attributes
+    ----------
+    measured_ratio, simulated_ratio : Estimate
+        Energy of the target over that of the reference condition.
+    error : ComparisonError
+        Of the two ratios, with its budget.
+    metrics : mapping of Estimate
+        ssim, mssim, psnr (dB), luminance_mssim of simulated against measured counts.
+    degradation : mapping of (simulated Estimate, measured Estimate)
+        The same metrics of this condition against its reference condition, within the simulation
+        and within the measurement: the paper's table 1.
+    """
+
+    pair: Pair
+    reference: str
+    measured_ratio: Estimate
+    simulated_ratio: Estimate
+    error: ComparisonError
+    metrics: Mapping[str, Estimate]
+    degradation: Mapping[str, tuple[Estimate, Estimate]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Comparison:
+    """The whole experiment compared.
+
+    Attributes
+    ----------
+    outcomes : tuple of Outcome
+        In the order of the experiment file.
+    covariance : array (conditions, conditions)
+        Of the relative errors E, all sources together; rows and columns of reference conditions
+        are zero.
+    data_range : float
+        L of every metric: full scale of the camera in counts.
+    """
+
+    title: str
+    synthetic: bool
+    outcomes: tuple[Outcome, ...]
+    covariance: FloatArray
+    data_range: float

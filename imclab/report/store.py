@@ -1,0 +1,62 @@
+"""The report's folder, and the ledger of what each file in it was made from."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+from imclab import provenance
+from imclab.errors import Fault, InputError, OutputError
+from imclab.files import written_whole
+
+LEDGER = "inputs.json"
+
+
+class Store:
+    """A folder of finished files that a later run with the same inputs need not make again.
+
+    Raises
+    ------
+    InputError
+        When the folder is a file, or holds files that no earlier report left.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._ledger_path = folder / LEDGER
+        if folder.exists() and not folder.is_dir():
+            raise InputError(str(folder), [Fault("output", "a file", "a folder")])
+        strangers = folder.is_dir() and any(folder.iterdir()) and not self._ledger_path.is_file()
+        if strangers:
+            wanted = "a folder that is empty, not there yet, or holds an earlier report"
+            raise InputError(str(folder), [Fault("output", "a folder with other files in it", wanted)])
+        self._ledger: dict[str, str] = {}
+        if self._ledger_path.is_file():
+            self._ledger = json.loads(self._ledger_path.read_text(encoding="utf-8"))
+
+    def holds(self, name: str, key: str) -> bool:
+        """Tell whether the file ``name`` is there and was made from the inputs that ``key`` names."""
+        return self._ledger.get(name) == key and (self.folder / name).is_file()
+
+    def keep(self, name: str, key: str, save: Callable[[Path], None]) -> None:
+        """Save the file ``name`` and note what it was made from; the folder is made when it is needed."""
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise OutputError(f"{self.folder}: cannot be made ({error.strerror or error})") from error
+        self._ledger.pop(name, None)
+        self._write()
+        save(self.folder / name)
+        self._ledger[name] = key
+        self._write()
+
+    def _write(self) -> None:
+        with written_whole(self._ledger_path) as temporary:
+            temporary.write_text(json.dumps(self._ledger, indent=2, sort_keys=True) + "\n", encoding="utf-8")
+
+
+def digest_of(*parts: str) -> str:
+    """Return one digest of all inputs of a file, the version of imclab among them."""
+    return hashlib.sha256("\0".join([provenance.versions()["imclab"], *parts]).encode()).hexdigest()
