@@ -15,6 +15,7 @@ import typer
 
 import imclab
 from imclab.commands.calibrate import calibrate
+from imclab.commands.gate import app as gate
 from imclab.commands.particles import particles
 from imclab.commands.sweep import sweep
 from imclab.commands.twin import twin
@@ -48,6 +49,7 @@ app.command("calibrate")(calibrate)
 app.command("particles")(particles)
 app.command("twin")(twin)
 app.command("sweep")(sweep)
+app.add_typer(gate, name="gate")
 
 
 def _tell(error: BaseException, code: int) -> int:

@@ -15,7 +15,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from rig.conversation import Conversation
-from rig.dialect import Dialect, Identity, Line, Property
+from rig.dialect import Dialect, Identity, Property
 from rig.errors import (
     Fault,
     LimitError,
@@ -296,9 +296,7 @@ class Generator:
             If this could not be confirmed; the box may still gate the tube.
         """
         self._verified.touched = True
-        steps = [
-            step for step in self.dialect.safe_steps(self.gate_output) if narrow or step.name != "width"
-        ]
+        steps = [step for step in self.dialect.safe_steps(self.gate_output) if narrow or step.name != "width"]
         failures: list[str] = []
         for attempt in range(_SAFE_ATTEMPTS):
             failures = []

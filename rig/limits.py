@@ -80,8 +80,10 @@ class Limits:
              f"at most {engineering_time(self.max_width_ps)}"),
             (delay_ps >= self.earliest_opening_ps, "delay", engineering_time(delay_ps),
              f"at least {engineering_time(self.earliest_opening_ps)} (earliest_opening)"),
-            (rate <= self.max_rate_hz, "rate", f"{float(rate):g} Hz", f"at most {float(self.max_rate_hz):g} Hz"),
-            (duty <= self.max_duty, "width x rate", f"{float(duty):.6g}", f"at most {float(self.max_duty):g}"),
+            (rate <= self.max_rate_hz, "rate", f"{float(rate):g} Hz",
+             f"at most {float(self.max_rate_hz):g} Hz"),
+            (duty <= self.max_duty, "width x rate", f"{float(duty):.6g}",
+             f"at most {float(self.max_duty):g}"),
         )  # fmt: skip
         return [Fault(where, came, wanted) for fine, where, came, wanted in checks if not fine]
 

@@ -67,7 +67,9 @@ def open_generator(
         link: Link = DryRunLink(simulated_device(box.name, serial=known.serial if known else None))
     else:
         link = SerialLink(port, speed)
-    conversation = Conversation(link, _dialect(box.name), Journal(journal), timeout_s=seconds(timeout, name="timeout"), baud=speed)
+    conversation = Conversation(
+        link, _dialect(box.name), Journal(journal), timeout_s=seconds(timeout, name="timeout"), baud=speed
+    )
     ownership = None if port is None else Ownership(port)
     return Generator(conversation, ownership=ownership, limits=known, read_only=read_only)
 
@@ -75,7 +77,11 @@ def open_generator(
 def open_simulated(device: Device) -> Generator:
     """Return a read-only generator on a simulated device of this process."""
     conversation = Conversation(
-        DryRunLink(device), _dialect(device.model), Journal(), timeout_s=1.0, baud=model_named(device.model).baud
+        DryRunLink(device),
+        _dialect(device.model),
+        Journal(),
+        timeout_s=1.0,
+        baud=model_named(device.model).baud,
     )
     return Generator(conversation, ownership=None, limits=None, read_only=True)
 

@@ -50,7 +50,7 @@ class Ownership:
             owner = os.pread(file, 500, 0).decode("utf-8", "replace").strip() or "another program"
             os.close(file)
             raise OwnedError(
-                f"{self.port}: owned by {owner}; wanted a free port. End that program (lock file {self.path})."
+                f"{self.port}: owned by {owner}; wanted a free port. End that program ({self.path})."
             ) from error
         holder = {
             "pid": os.getpid(),

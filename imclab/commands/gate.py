@@ -3,112 +3,50 @@
 from __future__ import annotations
 
 import functools
-import inspect
 import subprocess
 import time
-import typing
-from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
 import rig
-from imclab.commands.console import JSON_OPTION, Progress, emit
+from imclab.commands.console import Progress, emit
+from imclab.commands.gate_options import (
+    AsJson,
+    Baud,
+    JournalFile,
+    LimitsFile,
+    Live,
+    Model,
+    Port,
+    Timeout,
+    with_plan_options,
+)
 
 app = typer.Typer(no_args_is_help=True, help="Time the gate of an image intensifier over a serial line.")
-
-_PLAN_HELP = {
-    "distance": "Target distance, from where the beam enters the water: '12 m'.",
-    "delay": "Instead of a distance: the delay to program, '340 ns'.",
-    "model": "dg645 or bnc575 (also the QC 9520/9530).",
-    "output": "Output that gates the tube: AB, A, ...",
-    "width": "Gate width; default 3 ns, or the box's shortest.",
-    "pulse": "Laser pulse duration; default 4.5 ns.",
-    "convention": "front, centre or tail: where in the gate the return sits.",
-    "tail_delay": "With tail: open so long after the return's leading edge.",
-    "water": "fresh or sea.",
-    "group_index": "The group index itself.",
-    "temperature": "Of the water: '12 degC'.",
-    "salinity": "g/kg.",
-    "wavelength": "Default 532 nm.",
-    "cable_in": "Photodiode to generator: '2 m', or a measured '10 ns'.",
-    "cable_out": "Generator to tube.",
-    "cable_delay": "Default 5 ns/m.",
-    "photodiode": "Delay of the photodiode.",
-    "insertion": "Trigger to T0; default the model's (85 ns for a DG645).",
-    "pulser": "Delay of the gate pulser.",
-    "tube": "Delay of the tube's opening.",
-    "air_path": "Length of air on the light's way, out and back together.",
-    "pretrigger": "How long the trigger comes before the light.",
-    "offset": "One calibrated number in the place of all electronics.",
-    "offset_uncertainty": "Its standard uncertainty.",
-    "jitter": "Shot-to-shot rms of photodiode, pulser and tube.",
-    "trigger": "What arming uses; default 'external rising'.",
-    "rate": "The laser's repetition rate.",
-    "polarity": "positive or negative.",
-    "amplitude": "Of the gate's output: '2.5 V'.",
-}
-
-Port = Annotated[
-    str | None, typer.Option(help="Serial device, pty, socket://host:port or rfc2217://host:port.")
-]
-Baud = Annotated[int | None, typer.Option(help="Of the serial line; default the model's.")]
-Timeout = Annotated[str, typer.Option(help="How long the box may think.")]
-LimitsFile = Annotated[Path | None, typer.Option(help="Limits file (TOML); required with --live.")]
-JournalFile = Annotated[Path | None, typer.Option(help="Where every byte is written down before it is sent.")]
-Live = Annotated[bool, typer.Option("--live", help="Send; without it this is a dry run.")]
-AsJson = Annotated[bool, JSON_OPTION]
-Model = Annotated[str, typer.Option(help="dg645 or bnc575 (also the QC 9520/9530).")]
 
 _JOURNAL = Path("gate-journal.jsonl")
 
 
-def _with_plan_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command every option of ``rig.plan_gate`` and a gate file; it gets the plan first."""
-
-    @functools.wraps(command)
-    def planned(gate: Path | None, **given: Any) -> None:
-            chosen = {} if gate is None else rig.load_gate(gate)
-        from_words = {name: given.pop(name) for name in _PLAN_HELP}
-        chosen |= {name: value for name, value in from_words.items() if value is not None}
-        if "trigger" in chosen:
-            chosen["trigger"] = chosen["trigger"].replace("-", " ")
-        command(rig.plan_gate(**chosen), **given)
-
-    hints = typing.get_type_hints(command, include_extras=True)
-    own = list(inspect.signature(command).parameters.values())[1:]
-    words = {name: Annotated[str | None, typer.Option(help=text)] for name, text in _PLAN_HELP.items()}
-    words["gate"] = Annotated[Path | None, typer.Option(help="Gate file (TOML) with any of these options.")]
-    keyword = inspect.Parameter.KEYWORD_ONLY
-    parameters = [
-        inspect.Parameter(name, keyword, default=None, annotation=kind) for name, kind in words.items()
-    ]
-    parameters += [one.replace(kind=keyword, annotation=hints[one.name]) for one in own]
-    planned.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    planned.__annotations__ = {one.name: one.annotation for one in parameters}
-    del planned.__wrapped__  # type: ignore[attr-defined]
-    return planned
-
-
 @app.command()
-@_with_plan_options
+@with_plan_options
 def plan(
     plan: rig.GatePlan,
     *,
     plot: Annotated[Path | None, typer.Option(help="Draw the timing diagram into this file.")] = None,
-    json: AsJson = False,
+    as_json: AsJson = False,
 ) -> None:
     """Say what delay and width a target at a distance needs; nothing is sent."""
     if plot is not None:
         from imclab.gate_plot import save_timing_diagram
 
         save_timing_diagram(plan, plot)
-    emit(rig.plan_dict(plan), f"{rig.plan_table(plan)}\n\n{rig.plan_diagram(plan)}", as_json=json)
+    emit(rig.plan_dict(plan), f"{rig.plan_table(plan)}\n\n{rig.plan_diagram(plan)}", as_json=as_json)
 
 
 @app.command("set")
-@_with_plan_options
+@with_plan_options
 def set_gate(
     plan: rig.GatePlan,
     *,
@@ -120,7 +58,7 @@ def set_gate(
     hold: Annotated[str | None, typer.Option(help="How long to stay armed: '10 min'.")] = None,
     journal: JournalFile = None,
     timeout: Timeout = "1 s",
-    json: AsJson = False,
+    as_json: AsJson = False,
 ) -> None:
     """Program a gate and read it back; a dry run unless --live. It ends with the triggers off."""
     box = _open(plan.model.name, port, live, limits, plan, baud=baud, journal=journal, timeout=timeout)
@@ -142,11 +80,11 @@ def set_gate(
         "recoveries": box.conversation.recoveries,
         "sent": sent,
     }
-    emit(data, _set_text(data, sent), as_json=json)
+    emit(data, _set_text(data, sent), as_json=as_json)
 
 
 @app.command()
-@_with_plan_options
+@with_plan_options
 def scan(
     plan: rig.GatePlan,
     *,
@@ -157,7 +95,7 @@ def scan(
     fine: Annotated[bool, typer.Option("--fine", help="A sixth of the depth of field, not half.")] = False,
     grab: Annotated[
         str | None,
-        typer.Option(help="Command run at each step ({index}, {delay_ps}); prints a number or a frame's file."),
+        typer.Option(help="Command at each step ({index}, {delay_ps}); prints a number or a frame's file."),
     ] = None,
     dwell: Annotated[str, typer.Option(help="How long each step stays, armed.")] = "0 s",
     out: Annotated[Path | None, typer.Option("-o", "--output-file", help="CSV of the steps.")] = None,
@@ -167,13 +105,13 @@ def scan(
     live: Live = False,
     journal: JournalFile = None,
     timeout: Timeout = "1 s",
-    json: AsJson = False,
+    as_json: AsJson = False,
 ) -> None:
     """Sweep the gate over a range, every step read back; a dry run unless --live."""
     sweep = rig.plan_scan(
         plan, start=start, stop=stop, step=step, points=points, fineness="fine" if fine else "coarse"
     )
-    progress = Progress(quiet=json)
+    progress = Progress(quiet=as_json)
     taken = functools.partial(_run_grab, grab) if grab and live else None
     steps: list[rig.ScanStep] = []
     box = _open(plan.model.name, port, live, limits, plan, baud=baud, journal=journal, timeout=timeout)
@@ -183,7 +121,8 @@ def scan(
         with box:
             for one in rig.run_scan(box, sweep, grab=taken, dwell=dwell if live else "0 s"):
                 steps.append(one)
-                progress(f"{one.index + 1} of {len(sweep.delays_ps)}: {one.read_ps} ps, {one.distance_m:.3f} m")
+                done = f"{one.index + 1} of {len(sweep.delays_ps)}"
+                progress(f"{done}: {one.read_ps} ps, {one.distance_m:.3f} m")
     finally:
         progress.close()
         if out is not None and steps:
@@ -200,7 +139,7 @@ def scan(
         "file": None if out is None else str(out),
         "target": _target_of(plan, steps),
     }
-    emit(data, _scan_text(data), as_json=json)
+    emit(data, _scan_text(data), as_json=as_json)
 
 
 @app.command()
@@ -210,7 +149,7 @@ def status(
     baud: Baud = None,
     journal: Annotated[Path | None, typer.Option(help="Tell what this journal says the box holds.")] = None,
     timeout: Timeout = "1 s",
-    json: AsJson = False,
+    as_json: AsJson = False,
 ) -> None:
     """Read all settings of a generator, changing none; or what a journal says that it holds."""
     if journal is not None:
@@ -219,12 +158,13 @@ def status(
         data = {"journal": str(journal), "unconfirmed": replayed.unconfirmed, "settings": settings}
         head = f"{journal}: {'the last block was not confirmed' if replayed.unconfirmed else 'all confirmed'}"
     else:
-        with rig.open_generator(_needed(port), model=model, baud=baud, timeout=timeout, read_only=True) as box:
+        port = _needed(port)
+        with rig.open_generator(port, model=model, baud=baud, timeout=timeout, read_only=True) as box:
             settings = box.inherited
             data = {"port": port, "generator": box.identity.text, "settings": settings}
         head = f"{data['generator']} on {port}"
     rows = [f"  {name:<24} {value}" for name, value in _flat(settings)]
-    emit(data, "\n".join([head, *rows]), as_json=json)
+    emit(data, "\n".join([head, *rows]), as_json=as_json)
 
 
 @app.command()
@@ -235,12 +175,14 @@ def off(
     baud: Baud = None,
     journal: JournalFile = None,
     timeout: Timeout = "1 s",
-    json: AsJson = False,
+    as_json: AsJson = False,
 ) -> None:
     """Stop the triggers, narrow the gate, and confirm both; exit 3 if that cannot be confirmed."""
     journal = journal or _JOURNAL
     rig.switch_off(_needed(port), model=model, output=output, baud=baud, journal=journal, timeout=timeout)
-    emit({"port": port, "safe": True}, f"{port}: safe, confirmed: triggers off, gate narrowed", as_json=json)
+    emit(
+        {"port": port, "safe": True}, f"{port}: safe, confirmed: triggers off, gate narrowed", as_json=as_json
+    )
 
 
 @app.command()
@@ -255,18 +197,20 @@ def simulate(
     fault: Annotated[
         list[str] | None, typer.Option(help="Start with a fault: 'NAME [after=N] [count=N] [argument=X]'.")
     ] = None,
-    json: AsJson = False,
+    as_json: AsJson = False,
 ) -> None:
     """Be a virtual generator, until Ctrl-C; its address is on the first line."""
-    import json as json_module
+    import json
 
     from rig.simulator.side_door import answer
 
     address = tcp or (None if pty or link else "127.0.0.1:0")
     wants_pty = pty or link is not None
-    server = rig.simulate(model, tcp=address, pty=wants_pty, baud=baud, seed=seed, serial=serial, symlink=link)
+    server = rig.simulate(
+        model, tcp=address, pty=wants_pty, baud=baud, seed=seed, serial=serial, symlink=link
+    )
     for one in fault or []:
-        told = json_module.loads(answer(server, f"fault {one}"))
+        told = json.loads(answer(server, f"fault {one}"))
         if "error" in told:
             raise typer.BadParameter(told["error"])
     host, number = server.address or (None, None)
@@ -278,7 +222,7 @@ def simulate(
     lines = ([f"listening on socket://{host}:{number}"] if host else []) + (
         [f"pty {server.pty_name}"] if wants_pty else []
     )
-    print(json_module.dumps(data) if json else "\n".join([*lines, f"side door {door}"]), flush=True)
+    print(json.dumps(data) if as_json else "\n".join([*lines, f"side door {door}"]), flush=True)
     try:
         server.run()
     finally:
@@ -312,7 +256,9 @@ def _open(
 
 def _needed(port: str | None) -> str:
     if port is None:
-        raise typer.BadParameter("--port is needed: a serial device, socket://host:port or rfc2217://host:port")
+        raise typer.BadParameter(
+            "--port is needed: a serial device, socket://HOST:PORT or rfc2217://HOST:PORT"
+        )
     return port
 
 
@@ -362,7 +308,8 @@ def _set_text(data: dict[str, Any], sent: list[str]) -> str:
     if data["live"]:
         return "\n".join([head, *rows])
     dry = ["DRY RUN: nothing was sent; --live with --port and --limits would send:"]
-    return "\n".join([*dry, *(f"  {block!r}" for block in sent), head, *rows])
+    changing = [block for block in sent if any("?" not in line for line in block.split())]
+    return "\n".join([*dry, *(f"  {block!r}" for block in changing), head, *rows])
 
 
 def _scan_text(data: dict[str, Any]) -> str:
@@ -372,4 +319,5 @@ def _scan_text(data: dict[str, Any]) -> str:
     if data["target"] is None:
         return head
     found = data["target"]
-    return head + f"\ntarget at {found['distance_m']:.4f} m, standard uncertainty {found['uncertainty_m']:.4f} m"
+    metres, unsure = found["distance_m"], found["uncertainty_m"]
+    return f"{head}\ntarget at {metres:.4f} m, standard uncertainty {unsure:.4f} m"

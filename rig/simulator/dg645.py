@@ -161,7 +161,8 @@ class SimulatedDG645:
     def trigger(self, source: str = "external rising") -> bool:
         """Give a trigger at the virtual clock's time; return whether a cycle began."""
         wanted = {
-            "internal": (0,), "external rising": (1, 3), "external falling": (2, 4), "single": (5,), "line": (6,),
+            "internal": (0,), "external rising": (1, 3), "external falling": (2, 4), "single": (5,),
+            "line": (6,),
         }[source]  # fmt: skip
         mode = self.settings.numbers["TSRC"]
         if mode not in wanted or (mode in (3, 4, 5) and not self._armed_once):
