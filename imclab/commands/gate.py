@@ -39,7 +39,7 @@ def plan(
 ) -> None:
     """Say what delay and width a target at a distance needs; nothing is sent."""
     if plot is not None:
-        from imclab.gate_plot import save_timing_diagram
+        from imclab.commands.gate_plot import save_timing_diagram
 
         save_timing_diagram(plan, plot)
     emit(rig.plan_dict(plan), f"{rig.plan_table(plan)}\n\n{rig.plan_diagram(plan)}", as_json=as_json)
