@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import atexit
 import contextlib
-import time
 from dataclasses import dataclass
 from fractions import Fraction
 from types import TracebackType
@@ -20,20 +19,16 @@ from rig.errors import (
     Fault,
     LimitError,
     LinkError,
-    NotConfirmedSafeError,
     PlanError,
     ReadBackError,
-    RigError,
 )
 from rig.interruption import interruptible, undisturbed
 from rig.limits import Limits
 from rig.ownership import Ownership
+from rig.safe_state import make_safe
 from rig.safeguards import check_plan, check_setting, check_state, refuse
 from rig.timing import GatePlan, output_named
 from rig.verified import Applied, VerifiedSettings
-
-_SAFE_ATTEMPTS = 3
-_BETWEEN_ATTEMPTS_S = 0.5  # a port that was pulled may come back
 
 
 @dataclass(frozen=True)
@@ -295,35 +290,9 @@ class Generator:
         NotConfirmedSafeError
             If this could not be confirmed; the box may still gate the tube.
         """
-        self._verified.touched = True
-        steps = [step for step in self.dialect.safe_steps(self.gate_output) if narrow or step.name != "width"]
-        failures: list[str] = []
-        for attempt in range(_SAFE_ATTEMPTS):
-            failures = []
-            for step in steps:
-                wanted = self._property(step.name, step.output)
-                native = wanted.domain.native(step.value, wanted.where)
-                try:
-                    self._verified.set(wanted, step.value, native)
-                    if self._verified.ask(wanted) != native:
-                        raise ReadBackError(f"{wanted.where} is not {step.value}")
-                except RigError as error:
-                    failures.append(str(error))
-                    if isinstance(error, LinkError):
-                        break
-            if not failures:
-                self.conversation.journal.write("note", "safe state confirmed")
-                return
-            if attempt < _SAFE_ATTEMPTS - 1:
-                time.sleep(_BETWEEN_ATTEMPTS_S)
-                with contextlib.suppress(RigError):
-                    self.conversation.reopen()
-        self.conversation.journal.write("note", "NOT CONFIRMED SAFE")
-        reasons = "; ".join(failures)
-        raise NotConfirmedSafeError(
-            f"NOT CONFIRMED SAFE: {self.conversation.link.name}: {reasons}. The generator may still gate the "
-            "tube: switch off the intensifier's high voltage, then look at the generator."
-        )
+        steps = self.dialect.safe_steps(self.gate_output)
+        make_safe(self._verified, [step for step in steps if narrow or step.name != "width"])
+        self._running = False
 
     def save(self, slot: int) -> None:
         """Store all settings in the box's memory ``slot`` (1 to 9)."""
