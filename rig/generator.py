@@ -138,7 +138,7 @@ class Generator:
             self._let_go()
             raise
         self._open = True
-        atexit.register(self._close_at_exit)
+        atexit.register(self.close, failed=True)
 
     def close(self, *, failed: bool = False) -> None:
         """Make the box safe if anything was sent to it, and give the port back; safe to call twice.
@@ -156,7 +156,7 @@ class Generator:
         if not self._open:
             return
         self._open = False
-        atexit.unregister(self._close_at_exit)
+        atexit.unregister(self.close)
         try:
             if self._verified.touched:
                 self.make_safe(narrow=failed)
@@ -346,6 +346,3 @@ class Generator:
         if self._ownership is not None:
             self._ownership.release()
         self.conversation.journal.close()
-
-    def _close_at_exit(self) -> None:
-        self.close(failed=True)
