@@ -134,8 +134,10 @@ class Flux:
         Full widths at half maximum of irradiance (m) and of power (s); each with a ``_stderr``.
     spot_rms, pulse_rms : array (planes)
         Root mean square radius (m) and standard deviation in time (s); each with a ``_stderr``.
-    mean_path : array (planes)
-        Mean path length of the transmitted light, m, with a ``_stderr``.
+    mean_path, reflected_mean_path : array (planes)
+        Mean path length of the transmitted and of the reflected light, m; each with a ``_stderr``.
+    absorbed, absorbed_stderr : float
+        Share of the pulse that the water takes up before the last plane.
     """
 
     distances: FloatArray
@@ -153,6 +155,10 @@ class Flux:
     pulse_rms_stderr: FloatArray
     mean_path: FloatArray
     mean_path_stderr: FloatArray
+    reflected_mean_path: FloatArray
+    reflected_mean_path_stderr: FloatArray
+    absorbed: float
+    absorbed_stderr: float
     scene: str
     seed: int
     packets: int

@@ -37,8 +37,23 @@ def cached_kernel(function: Callable[..., Any]) -> Any:
     Only the outermost function, the one that Python calls, needs this; what it calls is plain
     :func:`device` code and compiled into it.
     """
+    return _compile(function, allocates=True)
+
+
+def cached_kernel_without_allocation(function: Callable[..., Any]) -> Any:
+    """Do what `cached_kernel` does for a kernel that makes no arrays but only fills those it is given.
+
+    numba then counts no references. The counting is atomic, happens whenever an array is taken out of
+    a NamedTuple, and made the forward engine 8 times slower.
+    """
+    return _compile(function, allocates=False)
+
+
+def _compile(function: Callable[..., Any], *, allocates: bool) -> Any:
     function.__qualname__ = f"{function.__qualname__}_{source_digest()}"
-    return numba.njit(cache=True, nogil=True, error_model="numpy", fastmath=set(FAST_ARITHMETIC))(function)
+    return numba.njit(
+        cache=True, nogil=True, error_model="numpy", fastmath=set(FAST_ARITHMETIC), _nrt=allocates
+    )(function)
 
 
 def device(function: Callable[..., Any]) -> Any:

@@ -23,8 +23,8 @@ from imclab.transport.kernel_cache import device
 
 _MULTIPLIER_0 = np.uint64(0xD2511F53)
 _MULTIPLIER_1 = np.uint64(0xCD9E8D57)
-_WEYL_0 = np.uint32(0x9E3779B9)
-_WEYL_1 = np.uint32(0xBB67AE85)
+_WEYL_0 = np.uint64(0x9E3779B9)
+_WEYL_1 = np.uint64(0xBB67AE85)
 _LOW_WORD = np.uint64(0xFFFFFFFF)
 _WORD_BITS = np.uint64(32)
 ROUNDS = 7
@@ -58,19 +58,27 @@ def _float_of(typing_context: Any, value: Any) -> Any:
 
 @device
 def philox(counter: Any, key_0: Any, key_1: Any, rounds: int) -> Any:
-    """Return four 32-bit words of a counter of four 32-bit words and a key of two."""
+    """Return four 32-bit words of a counter of four 32-bit words and a key of two.
+
+    All are uint64. The upper halves gather rubbish that the multiplications ignore; packing words to
+    32 bits after each round would cost 1.7 times as much.
+    """
     c0, c1, c2, c3 = counter
     for _ in range(rounds):
-        product_0 = _MULTIPLIER_0 * np.uint64(c0)
-        product_1 = _MULTIPLIER_1 * np.uint64(c2)
-        # 32-bit unsigned arithmetic widens in numba: each result is cast back
-        c0 = np.uint32(np.uint32(product_1 >> _WORD_BITS) ^ c1 ^ key_0)
-        c1 = np.uint32(product_1 & _LOW_WORD)
-        c2 = np.uint32(np.uint32(product_0 >> _WORD_BITS) ^ c3 ^ key_1)
-        c3 = np.uint32(product_0 & _LOW_WORD)
-        key_0 = np.uint32(key_0 + _WEYL_0)
-        key_1 = np.uint32(key_1 + _WEYL_1)
-    return c0, c1, c2, c3
+        product_0 = _MULTIPLIER_0 * (c0 & _LOW_WORD)
+        product_1 = _MULTIPLIER_1 * (c2 & _LOW_WORD)
+        c0 = (product_1 >> _WORD_BITS) ^ c1 ^ key_0
+        c2 = (product_0 >> _WORD_BITS) ^ c3 ^ key_1
+        c1 = product_1
+        c3 = product_0
+        key_0 = key_0 + _WEYL_0
+        key_1 = key_1 + _WEYL_1
+    return (
+        np.uint32(c0 & _LOW_WORD),
+        np.uint32(c1 & _LOW_WORD),
+        np.uint32(c2 & _LOW_WORD),
+        np.uint32(c3 & _LOW_WORD),
+    )
 
 
 @device
@@ -80,22 +88,13 @@ def words(seed: Any, history: Any, event: Any, stream: Any) -> Any:
     Parameters
     ----------
     seed, history : uint64
-    event : uint32
+    event : int
         Number of the event within the history: a launch, a collision, a reflection.
-    stream : uint32
+    stream : int
         Tells apart walks that share history numbers, such as those from laser and camera.
     """
-    return philox(
-        (
-            np.uint32(history & _LOW_WORD),
-            np.uint32(history >> _WORD_BITS),
-            np.uint32(event),
-            np.uint32(stream),
-        ),
-        np.uint32(seed & _LOW_WORD),
-        np.uint32(seed >> _WORD_BITS),
-        ROUNDS,
-    )
+    counter = (history & _LOW_WORD, history >> _WORD_BITS, np.uint64(event), np.uint64(stream))
+    return philox(counter, seed & _LOW_WORD, seed >> _WORD_BITS, ROUNDS)
 
 
 @device
@@ -166,13 +165,8 @@ def exp32(value: Any) -> Any:
 
 
 @device
-def azimuth32(word: Any) -> Any:
-    """Return sine and cosine of a uniformly random azimuth, float32.
-
-    Two bits of the word choose the quadrant, the other thirty the angle within 45 degrees of its axis.
-    """
-    inside = np.float32(np.int32(word & np.uint32(0x3FFFFFFF))) * np.float32(2.0**-30) - _HALF
-    x = inside * _HALF_PI
+def _sine_cosine_inside(x: Any) -> Any:
+    """Return sine and cosine of a float32 within 45 degrees (Cephes' polynomials)."""
     x2 = x * x
     sine = x + x * x2 * (
         np.float32(-1.6666654611e-1) + x2 * (np.float32(8.3321608736e-3) + x2 * np.float32(-1.9515295891e-4))
@@ -184,8 +178,33 @@ def azimuth32(word: Any) -> Any:
         * x2
         * (np.float32(4.166664568e-2) + x2 * (np.float32(-1.388731625e-3) + x2 * np.float32(2.443315711e-5)))
     )
+    return sine, cosine
+
+
+@device
+def azimuth32(word: Any) -> Any:
+    """Return sine and cosine of a uniformly random azimuth, float32.
+
+    Two bits of the word choose the quadrant, the other thirty the angle within 45 degrees of its axis.
+    """
+    inside = np.float32(np.int32(word & np.uint32(0x3FFFFFFF))) * np.float32(2.0**-30) - _HALF
+    sine, cosine = _sine_cosine_inside(inside * _HALF_PI)
     swap = (word & np.uint32(0x40000000)) != np.uint32(0)
     turn = (word & np.uint32(0x80000000)) != np.uint32(0)
     first = cosine if swap else sine
     second = -sine if swap else cosine
     return (-first if turn else first), (-second if turn else second)
+
+
+@device
+def sine_cosine32(angle: Any) -> Any:
+    """Return sine and cosine of a float32 angle from 0 to pi."""
+    quarter = np.floor(angle * np.float32(0.6366197723675814) + _HALF)
+    # pi/2 in two parts, so that the remainder keeps its digits
+    x = angle - quarter * np.float32(1.5703125) - quarter * np.float32(4.838267948966e-4)
+    sine, cosine = _sine_cosine_inside(x)
+    upright = quarter == _ONE
+    opposite = quarter > np.float32(1.5)
+    new_sine = cosine if upright else sine
+    new_cosine = -sine if upright else cosine
+    return (-new_sine if opposite else new_sine), (-new_cosine if opposite else new_cosine)

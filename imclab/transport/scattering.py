@@ -45,7 +45,8 @@ def henyey_greenstein_deviation(asymmetry: Any, u: Any, one: Any) -> Any:
     return min(narrow * narrow * u * (wide + d) / (d * d), one + one)
 
 
-def _is_closed_form(phase: Any) -> bool:
+def is_closed_form(phase: Any) -> bool:
+    """Tell, while compiling, whether a phase function's numba type is the closed form."""
     return getattr(phase, "instance_class", None) is HenyeyGreensteinLaw
 
 
@@ -70,30 +71,38 @@ def _density_table(phase: Any, deviation: Any) -> Any:
 
 @overload(sample_deviation)  # type: ignore[untyped-decorator]
 def _sample_deviation(phase: Any, u: Any) -> Any:
-    return _sample_closed_form if _is_closed_form(phase) else _sample_table
+    return _sample_closed_form if is_closed_form(phase) else _sample_table
 
 
 @overload(phase_density)  # type: ignore[untyped-decorator]
 def _phase_density(phase: Any, deviation: Any) -> Any:
-    return _density_closed_form if _is_closed_form(phase) else _density_table
+    return _density_closed_form if is_closed_form(phase) else _density_table
 
 
 @device
 def turn(direction: Any, deviation: Any, sine_azimuth: Any, cosine_azimuth: Any) -> Any:
-    """Return the unit direction at a deviation and an azimuth from a unit direction.
+    """Return the unit direction at a deviation and an azimuth from a unit direction, in float64."""
+    return turn_in(1.0, direction, deviation, sine_azimuth, cosine_azimuth)
+
+
+@device
+def turn_in(one: Any, direction: Any, deviation: Any, sine_azimuth: Any, cosine_azimuth: Any) -> Any:
+    """Do what `turn` does in the precision of ``one``.
 
     Eq. 19 divides by sqrt(1 - u_z^2), which is zero along the axis. This basis has no such place and
-    no branch (Duff et al. 2017, "Building an orthonormal basis, revisited", JCGT 6, 1).
+    no branch (Duff et al. 2017, "Building an orthonormal basis, revisited", JCGT 6, 1). One step of
+    Newton's method keeps the length at 1 over any number of turns, without a root or a division.
     """
     x, y, z = direction
-    sign = math.copysign(1.0, z)
-    a = -1.0 / (sign + z)
+    sign = one if z >= 0 else -one
+    a = -one / (sign + z)
     b = x * y * a
-    sine = math.sqrt(deviation * (2.0 - deviation))
+    sine = math.sqrt(deviation * (one + one - deviation))
     along, across = sine * cosine_azimuth, sine * sine_azimuth
-    forward = 1.0 - deviation
-    new_x = forward * x + along * (1.0 + sign * x * x * a) + across * b
+    forward = one - deviation
+    new_x = forward * x + along * (one + sign * x * x * a) + across * b
     new_y = forward * y + along * sign * b + across * (sign + y * y * a)
     new_z = forward * z - along * sign * x - across * y
-    scale = 1.0 / math.sqrt(new_x * new_x + new_y * new_y + new_z * new_z)
+    half = one / (one + one)
+    scale = one + half - half * (new_x * new_x + new_y * new_y + new_z * new_z)
     return new_x * scale, new_y * scale, new_z * scale

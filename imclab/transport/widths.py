@@ -1,0 +1,109 @@
+"""Full widths at half maximum of a spot and of a pulse, from histograms."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+FloatArray = NDArray[np.float64]
+
+PEAK_WINDOW = 0.5
+"""The peak is a fit over radii up to this part of the half width."""
+CROSSING_WINDOW = 0.2
+"""The crossing is a fit over radii within this part of the half width around it."""
+_ROUNDS = 12
+
+
+def spot_fwhm(edges: FloatArray, energy: FloatArray) -> float:
+    """Return twice the radius at which the irradiance is half of that on the axis, m.
+
+    The peak is fitted by a + b r^2 near the axis and the crossing by a straight line around it, each
+    over a window that is a part of the half width, found by repetition.
+
+    Parameters
+    ----------
+    edges : array (bins + 1)
+        Radii, m; the last may be infinite, its bin is not used.
+    energy : array (bins)
+        Energy in each ring.
+
+    Returns
+    -------
+    float
+        NaN when nothing arrived.
+    """
+    finite = np.isfinite(edges[1:])
+    inner, outer, energy = edges[:-1][finite], edges[1:][finite], energy[finite]
+    area = np.pi * (outer**2 - inner**2)
+    radius = np.sqrt(0.5 * (inner**2 + outer**2))
+    total = energy.sum()
+    if not total > 0.0:
+        return np.nan
+    irradiance = energy / area
+    half_width = radius[np.searchsorted(np.cumsum(energy), 0.5 * total)]
+    for _ in range(_ROUNDS):
+        window = radius <= max(PEAK_WINDOW * half_width, radius[min(3, radius.size - 1)])
+        peak = _fitted(radius[window] ** 2, irradiance[window], area[window])[0]
+        below = _smooth(irradiance, area, radius, half_width) < 0.5 * peak
+        crude = radius[np.argmax(below)] if below.any() else radius[-1]
+        near = np.abs(radius - crude) <= max(CROSSING_WINDOW * crude, 2.5 * (outer - inner)[np.argmax(below)])
+        level, slope = _fitted(radius[near] - crude, irradiance[near], area[near])
+        refined = crude + (0.5 * peak - level) / slope if slope < 0.0 else crude
+        new = refined if abs(refined - crude) <= CROSSING_WINDOW * crude else crude
+        if abs(new - half_width) <= 1e-6 * new:
+            break
+        half_width = new
+    return float(2.0 * half_width)
+
+
+def _fitted(x: FloatArray, y: FloatArray, weight: FloatArray) -> tuple[float, float]:
+    """Return value at 0 and slope of a straight line by weighted least squares."""
+    mean_x, mean_y = np.average(x, weights=weight), np.average(y, weights=weight)
+    spread = np.average((x - mean_x) ** 2, weights=weight)
+    slope = np.average((x - mean_x) * (y - mean_y), weights=weight) / spread if spread > 0.0 else 0.0
+    return float(mean_y - slope * mean_x), float(slope)
+
+
+def _smooth(irradiance: FloatArray, area: FloatArray, radius: FloatArray, width: float) -> FloatArray:
+    """Return the mean irradiance within a tenth of the half width around each radius."""
+    low = np.searchsorted(radius, radius - 0.1 * width)
+    high = np.searchsorted(radius, radius + 0.1 * width, side="right")
+    energy = np.concatenate(([0.0], np.cumsum(irradiance * area)))
+    areas = np.concatenate(([0.0], np.cumsum(area)))
+    return np.asarray((energy[high] - energy[low]) / (areas[high] - areas[low]))
+
+
+def pulse_fwhm(delay: FloatArray, weight: FloatArray, sigma: float) -> float:
+    """Return the full width at half maximum of a Gaussian pulse smeared by delays, s.
+
+    Parameters
+    ----------
+    delay, weight : array (n)
+        Delays, s, and the energy that has each.
+    sigma : float
+        Standard deviation of the pulse, s.
+    """
+    present = weight > 0.0
+    delay, weight = delay[present], weight[present]
+    if not weight.size:
+        return np.nan
+
+    def power(time: float) -> float:
+        return float(weight @ np.exp(-0.5 * ((time - delay) / sigma) ** 2))
+
+    # the delays that carry the energy; the far tail does not move the half maximum
+    bulk = np.interp([0.001, 0.999], np.cumsum(weight) / weight.sum(), delay)
+    grid = np.linspace(bulk[0] - 3.0 * sigma, bulk[1] + 3.0 * sigma, 301)
+    profile = np.exp(-0.5 * ((grid[:, None] - delay) / sigma) ** 2) @ weight
+    top = int(np.argmax(profile))
+    # a parabola through the three highest points places the maximum to 1e-6 of sigma
+    before, here, after = profile[top - 1 : top + 2]
+    peak_time = grid[top] + 0.5 * (grid[1] - grid[0]) * (before - after) / (before - 2.0 * here + after)
+    half = 0.5 * power(peak_time)
+    left = grid[np.flatnonzero(profile[:top] < half)[-1]]
+    right = grid[top + np.flatnonzero(profile[top:] < half)[0]]
+    return float(
+        brentq(lambda t: power(t) - half, peak_time, right, xtol=1e-12 * sigma)
+        - brentq(lambda t: power(t) - half, left, peak_time, xtol=1e-12 * sigma)
+    )
