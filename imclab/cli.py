@@ -17,7 +17,9 @@ import imclab
 from imclab.commands.calibrate import calibrate
 from imclab.commands.gate import app as gate
 from imclab.commands.particles import particles
+from imclab.commands.simulate import simulate
 from imclab.commands.sweep import sweep
+from imclab.commands.transmit import transmit
 from imclab.commands.twin import twin
 
 app = typer.Typer(
@@ -45,6 +47,8 @@ def _root(
     """Find out whether the simulation of a range-gated underwater imaging rig can be believed."""
 
 
+app.command("simulate")(simulate)
+app.command("transmit")(transmit)
 app.command("calibrate")(calibrate)
 app.command("particles")(particles)
 app.command("twin")(twin)

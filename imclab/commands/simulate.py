@@ -1,0 +1,76 @@
+"""``imclab simulate``: the picture of a scene."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from imclab.commands.console import JSON_OPTION, Progress, emit, told
+
+
+def simulate(
+    scene: Annotated[Path, typer.Argument(help="The scene file.")],
+    output: Annotated[Path, typer.Option("--output", "-o", help="The result, an HDF5 file.")],
+    rel_error: Annotated[float | None, typer.Option(help="Stop at this relative error of the total.")] = None,
+    seconds: Annotated[float | None, typer.Option(help="Stop after so long.")] = None,
+    packets: Annotated[float | None, typer.Option(help="Stop after so many packets.")] = None,
+    estimator: Annotated[
+        str | None, typer.Option(help="auto, analog, expected or two-sided; else that of the scene.")
+    ] = None,
+    seed: Annotated[int | None, typer.Option(help="The random numbers follow from it.")] = None,
+    threads: Annotated[int | None, typer.Option(help="Threads; default: all.")] = None,
+    time_bins: Annotated[int | None, typer.Option(help="Bins of the time histogram; 0: none.")] = None,
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Tell what was left out and why.")] = False,
+    as_json: Annotated[bool, JSON_OPTION] = False,
+) -> None:
+    """Simulate a picture, with the standard error of every pixel.
+
+    Example: imclab simulate data/scenes/lambertian_slit.toml -o slit.h5 --rel-error 0.01
+    """
+    import imclab
+    from imclab.errors import InterruptedRunError
+    from imclab.transport.simulation import DEFAULT_TIME_BINS
+
+    progress = Progress()
+    try:
+        result = imclab.simulate(
+            imclab.load_scene(scene),
+            rel_error=rel_error,
+            seconds=seconds,
+            packets=packets,
+            estimator=estimator,
+            seed=seed,
+            threads=threads,
+            time_bins=DEFAULT_TIME_BINS if time_bins is None else time_bins,
+            progress=lambda reached: progress(told(reached)),
+        )
+    finally:
+        progress.close()
+    result.save(output)
+    summary = {
+        "output": str(output),
+        "total": result.total,
+        "total_stderr": result.total_stderr,
+        "relative_error": result.relative_error,
+        "target_total": result.target_total,
+        "target_total_stderr": result.target_total_stderr,
+        "backscatter_total": result.backscatter_total,
+        "backscatter_total_stderr": result.backscatter_total_stderr,
+        "estimator": result.estimator,
+        "seed": result.seed,
+        "packets": result.packets,
+        "cpu_seconds": result.cpu_seconds,
+        "wall_seconds": result.wall_seconds,
+        "interrupted": result.interrupted,
+        "notes": result.notes,
+    }
+    words = (
+        f"{output}: {result.total:.5g} J +- {result.total_stderr:.2g} J "
+        f"(backscatter {result.backscatter_total:.3g} J), {result.estimator}, "
+        f"{result.packets:.3g} packets, {result.cpu_seconds:.2f} s of CPU"
+    )
+    emit(summary, "\n  ".join([words, *(result.notes if verbose else ())]), as_json=as_json)
+    if result.interrupted:
+        raise InterruptedRunError(f"interrupted; what was finished is in {output}")
