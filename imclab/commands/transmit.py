@@ -17,7 +17,7 @@ def transmit(
         str | None,
         typer.Option(help='Planes, as "0.5 m, 1 m" or "1 m to 30 m in 10"; default: the target\'s.'),
     ] = None,
-    rel_error: Annotated[float | None, typer.Option(help="Stop at this relative error of the shares.")] = None,
+    rel_error: Annotated[float | None, typer.Option(help="Stop at this relative error.")] = None,
     seconds: Annotated[float | None, typer.Option(help="Stop after so long.")] = None,
     packets: Annotated[float | None, typer.Option(help="Stop after so many packets.")] = None,
     seed: Annotated[int | None, typer.Option(help="The random numbers follow from it.")] = None,

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from imclab import materials
 from imclab.optics import surface
+from imclab.optics.metals import metal_index
 from imclab.optics.reflection import Surface
-
-METALS = {"silver": 0.054 - 3.43j, "nickel": 1.88 - 3.49j}
-"""Absolute indices at 532 nm of Johnson and Christy 1972, 1974."""
 
 
 def surface_of(material: materials.Material, refractive_index: float, wavelength: float) -> Surface:
@@ -16,5 +14,9 @@ def surface_of(material: materials.Material, refractive_index: float, wavelength
         return surface.Lambertian(material.reflectance).parameters
     if isinstance(material, materials.Diffuse):
         return surface.Diffuse(material.body_reflectance, material.index / refractive_index).parameters
-    index = material.index if material.index is not None else METALS[material.material or "silver"]
+    index = (
+        material.index
+        if material.index is not None
+        else metal_index(material.material or "silver", wavelength)
+    )
     return surface.Microfacet(material.roughness, index / refractive_index).parameters
