@@ -18,15 +18,14 @@ out, and the share of such packets is known. A batch of ``count`` emitted packet
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numba.extending import overload
-from numpy.typing import NDArray
 
-from imclab.optics.phase_table import PhaseTable
 from imclab.transport import phase_sampling
 from imclab.transport.kernel_cache import cached_kernel_without_allocation, device
+from imclab.transport.lane_arrays import DELAY_BINS, LANES, RADIAL_BINS, RECORDS
 from imclab.transport.random import (
     azimuth32,
     exp32,
@@ -36,111 +35,18 @@ from imclab.transport.random import (
     uniform64,
     words,
 )
-from imclab.transport.scattering import (
-    HenyeyGreensteinLaw,
-    henyey_greenstein_deviation,
-    is_closed_form,
-    turn_in,
-)
-
-BATCH_SIZE = 1 << 18
-LANES = 1024
-"""Packets in flight: their properties, 50 kB, and the buffers beside them stay in the second cache."""
-RECORDS = 2048
-RADIAL_BINS = 1024
-DELAY_BINS = 512
-ROULETTE_WEIGHT = 1e-3
-_LONGEST = 1e30
+from imclab.transport.scattering import henyey_greenstein_deviation, is_closed_form, turn_in
 
 # Properties of a packet: rows of one array, so that LLVM sees that they cannot overlap.
 _X, _Y, _Z, _DX, _DY, _DZ, _PATH, _DEATH, _LIMIT, _DEVIATION = (np.uint64(LANES * row) for row in range(10))
-_PROPERTIES = 10
 # Whole numbers of a packet: its history within the batch, its event, and random words.
 _HISTORY, _EVENT, _WORD0, _WORD1, _WORD2 = (np.uint64(LANES * row) for row in range(5))
-_NUMBERS = 5
 _LAUNCH, _ENDS, _WALK = np.uint64(0), np.uint64(1), np.uint64(2)
 _ZERO, _HALF, _ONE, _TWO = np.float32(0.0), np.float32(0.5), np.float32(1.0), np.float32(2.0)
 _PI = np.float32(math.pi)
 
 
-class Slab(NamedTuple):
-    """What the kernel needs of a scene; lengths in metres, single precision where the lanes use it.
-
-    ``farthest`` bounds the first free path of the packets that are followed, ``roulette_path`` is where
-    the weight reaches ROULETTE_WEIGHT. Radius and excess path fall on the middle of their histograms
-    at ``radial_scale`` and ``delay_scale``: bin numbers go as r / (r + scale).
-    """
-
-    phase: HenyeyGreensteinLaw | PhaseTable
-    planes: NDArray[np.float32]
-    absorption: np.float32
-    roulette_path: np.float32
-    mean_free_path: np.float32
-    followed: np.float32
-    spot_sigma: np.float32
-    divergence_sigma: np.float32
-    radial_scale: np.float32
-    delay_scale: np.float32
-
-
-class Records(NamedTuple):
-    """Crossings not yet summed: where, after which path, and to which row of the sums they belong."""
-
-    x: NDArray[np.float32]
-    y: NDArray[np.float32]
-    path: NDArray[np.float32]
-    excess: NDArray[np.float32]
-    row: NDArray[np.int32]
-    weight: NDArray[np.float32]
-    square: NDArray[np.float32]
-    radial_bin: NDArray[np.int32]
-    delay_bin: NDArray[np.int32]
-
-
-class Work(NamedTuple):
-    """Room for a kernel to work in: a pool of launched packets, the lanes, and crossings."""
-
-    pool: NDArray[np.float32]
-    pool_numbers: NDArray[np.uint32]
-    lanes: NDArray[np.float32]
-    numbers: NDArray[np.uint32]
-    plane: NDArray[np.int32]
-    crossed: NDArray[np.bool_]
-    records: Records
-
-
-def room(planes: int) -> Work:
-    """Return the arrays that one call of the kernel works in; not to be shared between threads."""
-    size = RECORDS + planes + 1
-    integer, single = np.int32, np.float32
-    kinds = (single, single, single, single, integer, single, single, integer, integer)
-    return Work(
-        np.zeros(_PROPERTIES * LANES, single),
-        np.zeros(_NUMBERS * LANES, np.uint32),
-        np.zeros(_PROPERTIES * LANES, single),
-        np.zeros(_NUMBERS * LANES, np.uint32),
-        np.zeros(LANES, integer),
-        np.zeros(LANES, np.bool_),
-        Records._make(np.zeros(size, kind) for kind in kinds),
-    )
-
-
-class Sums(NamedTuple):
-    """Sums over packets, of n planes.
-
-    ``moments`` has a row for light through each plane and then one for light out of z = 0 that had
-    crossed 0, 1, ... n - 1 planes; its columns are weight, weight r^2, weight p, weight p^2, where p is
-    the path beyond the plane's distance. ``radial`` (n, bins) sums weights, ``delay`` (n, 2, bins)
-    weights and weights times p. ``absorbed`` energy, packets ``sampled`` and ``collisions`` are one number
-    each.
-    """
-
-    moments: NDArray[np.float64]
-    radial: NDArray[np.float64]
-    delay: NDArray[np.float64]
-    absorbed: NDArray[np.float64]
-    sampled: NDArray[np.float64]
-    collisions: NDArray[np.float64]
+_LONGEST = np.float32(1e30)
 
 
 @cached_kernel_without_allocation
@@ -200,7 +106,7 @@ def _launch(slab: Any, seed: Any, first: Any, launched: Any, fresh: Any, pool: A
         pool[_DX + i], pool[_DY + i], pool[_DZ + i] = dx, dy, dz
         pool[_PATH + i] = path
         excess = -log32(uniform32(w5)) * (_ONE / max(slab.absorption, np.float32(1e-30)))
-        pool[_DEATH + i] = slab.roulette_path + min(excess, np.float32(_LONGEST))
+        pool[_DEATH + i] = slab.roulette_path + min(excess, _LONGEST)
 
 
 @device

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imclab.optics.phase_table import PhaseTable
-from imclab.transport import lanes, unscattered
+from imclab.transport import lane_arrays, unscattered
+from imclab.transport.lanes import follow
 from imclab.transport.media import Water
 from imclab.transport.runner import Estimator, Tally
 from imclab.transport.scattering import HenyeyGreensteinLaw
@@ -24,12 +25,12 @@ _ENDLESS = 1e30
 
 def radial_edges(radial_scale: float) -> FloatArray:
     """Return the edges of the radial bins, m; the last is infinite."""
-    return _edges(radial_scale, lanes.RADIAL_BINS)
+    return _edges(radial_scale, lane_arrays.RADIAL_BINS)
 
 
 def delay_edges(delay_scale: float) -> FloatArray:
     """Return the edges of the bins in path beyond the plane's distance, m; the last is infinite."""
-    return _edges(delay_scale, lanes.DELAY_BINS)
+    return _edges(delay_scale, lane_arrays.DELAY_BINS)
 
 
 def _edges(scale: float, bins: int) -> FloatArray:
@@ -52,7 +53,7 @@ def make(
 ) -> tuple[Estimator, float]:
     """Return the estimator of what crosses planes for the first time, and the share that it samples.
 
-    Its quantities are those of :class:`lanes.Sums`: per packet that is scattered before the last
+    Its quantities are those of :class:`lane_arrays.Sums`: per packet that is scattered before the last
     plane, of which there are ``sampled``. The share of such packets is known and returned.
 
     Parameters
@@ -68,9 +69,11 @@ def make(
     steepest = beam.divergence_sigma * math.sqrt(2.0 * _LARGEST_EXPONENT)
     longest = farthest / math.cos(steepest) if steepest < 1.5 else math.inf
     followed = -math.expm1(-water.scattering * longest) if water.scattering > 0.0 else 0.0
-    roulette = -math.log(lanes.ROULETTE_WEIGHT) / water.absorption if water.absorption > 0.0 else _ENDLESS
+    roulette = (
+        -math.log(lane_arrays.ROULETTE_WEIGHT) / water.absorption if water.absorption > 0.0 else _ENDLESS
+    )
     single = np.float32
-    slab = lanes.Slab(
+    slab = lane_arrays.Slab(
         phase,
         np.array(planes, dtype=single),
         single(water.absorption),
@@ -87,28 +90,30 @@ def make(
         sums = _empty_sums(len(planes))
         followed_count = math.ceil(count * followed)
         if followed > 0.0:
-            work = lanes.room(len(planes))
-            lanes.follow(slab, np.uint64(seed), np.uint64(first_history), followed_count, sums, work)
+            work = lane_arrays.room(len(planes))
+            follow(slab, np.uint64(seed), np.uint64(first_history), followed_count, sums, work)
         return sums._asdict()
 
     notes = () if followed > 0.0 else ("nothing is scattered: all of it is computed",)
     exact = _unscattered_sums(water, beam, planes, slab)
-    estimator = Estimator("one-way", batch, lanes.BATCH_SIZE, exact=exact._asdict(), notes=notes)
+    estimator = Estimator("one-way", batch, lane_arrays.BATCH_SIZE, exact=exact._asdict(), notes=notes)
     return estimator, unscattered.scattered_share(unscattered.rays_of(beam), water.scattering, farthest)
 
 
-def _empty_sums(planes: int) -> lanes.Sums:
-    return lanes.Sums(
+def _empty_sums(planes: int) -> lane_arrays.Sums:
+    return lane_arrays.Sums(
         np.zeros((2 * planes, 4)),
-        np.zeros((planes, lanes.RADIAL_BINS)),
-        np.zeros((planes, 2, lanes.DELAY_BINS)),
+        np.zeros((planes, lane_arrays.RADIAL_BINS)),
+        np.zeros((planes, 2, lane_arrays.DELAY_BINS)),
         np.zeros(1),
         np.zeros(1),
         np.zeros(1),
     )
 
 
-def _unscattered_sums(water: Water, beam: Beam, planes: Sequence[float], slab: lanes.Slab) -> lanes.Sums:
+def _unscattered_sums(
+    water: Water, beam: Beam, planes: Sequence[float], slab: lane_arrays.Slab
+) -> lane_arrays.Sums:
     """Return what crosses unscattered, per emitted packet, in the shape of the kernel's sums."""
     sums = _empty_sums(len(planes))
     rays = unscattered.rays_of(beam)
@@ -121,7 +126,7 @@ def _unscattered_sums(water: Water, beam: Beam, planes: Sequence[float], slab: l
         )
         excess = unscattered.excess_path(rays, distance)
         weight = rays.share * np.exp(-water.attenuation * (distance + excess))
-        place = np.minimum(np.searchsorted(delays, excess, side="right") - 1, lanes.DELAY_BINS - 1)
+        place = np.minimum(np.searchsorted(delays, excess, side="right") - 1, lane_arrays.DELAY_BINS - 1)
         np.add.at(sums.delay[row, 0], place, weight)
         np.add.at(sums.delay[row, 1], place, weight * excess)
     sums.moments[len(planes), 0] = unscattered.backward_share(beam)
