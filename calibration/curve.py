@@ -87,6 +87,18 @@ class Response:
         found = np.interp(counts, table, self._slopes)
         return np.asarray(np.where(counts < table[0], self._chord, found))
 
+    def secant(self, counts: Floats, noise: Floats | float = 0.0) -> Floats:
+        """Mean slope dx/dy over the reach of the noise, at least 10 % to both sides.
+
+        Photon transfer needs the slope, which a curve through noisy levels gives poorly at a point
+        and well over a stretch.
+        """
+        table, exposure = self.table
+        reach = np.maximum(0.1 * counts, np.asarray(noise))
+        low, high = np.maximum(counts - reach, table[0]), np.minimum(counts + reach, table[-1])
+        rise = np.interp(high, table, exposure) - np.interp(low, table, exposure)
+        return np.asarray(rise / np.maximum(high - low, 1e-12))
+
     def node_weights(self, counts: Floats) -> Floats:
         """How much each node says at some counts above dark (points x nodes), for its covariance."""
         at = np.log(np.clip(counts, self.lowest, self.highest))

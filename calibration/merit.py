@@ -63,7 +63,7 @@ def _of_setting(evidence: Evidence, index: int) -> list[Figure]:
         return Figure(name, gain, value, stderr, systematic, unit)
 
     middle = 0.5 * (evidence.response.lowest + evidence.response.highest)
-    per_exposure = 1.0 / float(evidence.response.exposure_per_count(np.array([middle]))[0])
+    per_exposure = 1.0 / float(evidence.response.secant(np.array([middle]))[0])
     conversion = transfer.shot * per_exposure
     relative = transfer.shot_stderr / transfer.shot if transfer.shot > 0.0 else math.nan
     dark_deviation = math.sqrt(transfer.read_variance)

@@ -221,7 +221,7 @@ class Calibration:
         values = np.asarray(energy, dtype=np.float64)
         setting, _, flat, _ = self._maps(values.shape, gain, typical=typical)
         exposure = np.maximum(values, 0.0) * np.exp(self._gain_table.at(gain).log_gain) * flat
-        slope = self.response.exposure_per_count(self.response.counts(exposure))
+        slope = self.response.secant(np.nan_to_num(self.response.counts(exposure), nan=self.response.limit))
         return np.asarray(np.sqrt(setting.read_variance + setting.shot * exposure / slope**2))
 
     def noise_correlation(self, gain: float) -> Floats:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 import math
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from importlib import metadata
 from pathlib import Path
@@ -15,13 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration import frames
+from calibration.correct import typical_pixels
 from calibration.curve import Response
 from calibration.folder import Series, read_folder
 from calibration.merit import Evidence, figures_of_merit, linearity_error
 from calibration.model import Calibration
 from calibration.noise import Transfer, TransferPoints, fit_transfer
 from calibration.reader import Progress, Reader
-from calibration.response import JointFit, fit_jointly, rising
+from calibration.response import JointFit, Levels, fit_jointly, rising
 from calibration.runs import Run, clipped, faults_of_runs, levels_of, reference_of, saturation_of, usable
 from calibration.setting import Setting
 from calibration.stages import DarkField, FlatField, dark_fields, flat_fields, light_runs
@@ -72,7 +73,16 @@ def calibrate(
         progress("solving response, gain and noise")
     good = defects == 0
     lowest_dark = min(float(np.median(field.picture[good])) for field in darks.values())
-    fit, used = _fit_without_outliers(runs, series, saturation, lowest_dark, reader)
+    dark_variance = {gain: field.statistics.variance for gain, field in darks.items()}
+    fit, used = _fit_without_outliers(
+        usable(runs, saturation),
+        lambda chosen: levels_of(
+            chosen, series, dark_variance=dark_variance, saturation_above_dark=saturation - lowest_dark
+        ),
+        reader,
+    )
+    straightened = {run.where: run for run in used}
+    runs = [straightened.get(run.where, run) for run in runs]
     response = _response(fit, used, saturation - lowest_dark)
     flat_maps = {gain: _sensitivity(field, response, good) for gain, field in flats.items()}
     transfers, systematic = _transfers(series, runs, darks, fit, response, saturation, reader)
@@ -112,17 +122,17 @@ def calibrate(
 
 
 def _fit_without_outliers(
-    runs: Sequence[Run], series: Series, saturation: float, dark_level: float, reader: Reader
+    runs: Sequence[Run], levels: Callable[[Sequence[Run]], Levels], reader: Reader
 ) -> tuple[JointFit, list[Run]]:
     """Solve; leave out runs that no error of their size explains, one at a time, and say so."""
-    used = usable(runs, saturation)
+    used = list(runs)
     allowed = len(used) // 20
     while True:
-        fit = fit_jointly(levels_of(used, series, saturation - dark_level))
+        fit = fit_jointly(levels(used))
         strange = np.nan_to_num(np.abs(fit.residual) / fit.scatter)
         worst = int(np.argmax(strange))
         if strange[worst] < OUTLIER_SIGMAS or not allowed:
-            return fit, used
+            return fit, [run.with_mean(float(mean)) for run, mean in zip(used, fit.counts, strict=True)]
         allowed -= 1
         reader.notes.append(
             f"{used[worst].where}: this run lies {strange[worst]:.1f} standard errors off the "
@@ -141,7 +151,7 @@ def _response(fit: JointFit, used: Sequence[Run], saturation_above_dark: float) 
 def _sensitivity(field: FlatField, response: Response, good: NDArray[np.bool_]) -> NDArray[np.float32]:
     """Relative sensitivity of each pixel; 1 for the typical pixel, and where a bad one has none."""
     exposure = response.exposure(np.minimum(field.picture.astype(np.float64), response.limit))
-    relative = exposure / float(np.median(exposure[good]))
+    relative = exposure / float(exposure[typical_pixels(field.picture, good)].mean())
     return np.where(good & (relative > 0.0), relative, 1.0).astype(np.float32)
 
 
@@ -176,10 +186,13 @@ def _transfers(
             [fit_transfer(_points(members, darks[gain], draw)).shot for draw in draws] if members else [0.0]
         )
         systematic.append(float(np.std(shots) / found.shot) if found.shot > 0.0 else math.nan)
-        reader.notes += [
-            f"{members[index].where}: noise of this run does not fit photon transfer; little weight given"
-            for index in found.outliers
-        ]
+        if found.outliers:
+            few = ", ".join(members[index].where for index in found.outliers[:3])
+            named = f"{few}{', ...' if len(found.outliers) > 3 else ''}"
+            reader.notes.append(
+                f"gain {gain:g}: the noise of {len(found.outliers)} of {len(members)} runs does not fit "
+                f"photon transfer; little weight was given to them ({named})"
+            )
     return transfers, systematic
 
 
@@ -197,6 +210,7 @@ def _drawn_responses(fit: JointFit, response: Response) -> list[Response]:
 def _points(members: Sequence[Run], dark: DarkField, response: Response) -> TransferPoints:
     counts = np.array([run.statistics.mean for run in members])
     found = [run.statistics for run in members]
+    noise = np.sqrt([max(item.variance, 0.0) for item in found])
     dark_variance = dark.statistics.variance
     if not math.isfinite(dark_variance):
         dark_variance, dark_error = 1.0 / 12.0, 1.0
@@ -206,7 +220,7 @@ def _points(members: Sequence[Run], dark: DarkField, response: Response) -> Tran
     return TransferPoints(
         variance=np.array([item.variance for item in found]),
         variance_stderr=np.array([item.variance_stderr for item in found]),
-        lever=response.exposure(counts) / response.exposure_per_count(counts) ** 2,
+        lever=response.exposure(counts) / response.secant(counts, noise) ** 2,
         lags=np.array([item.lags for item in found]).reshape(-1, size, size),
         pixels=np.array([item.lag_count * item.pixels for item in found], dtype=np.float64),
         dark_variance=dark_variance,
@@ -256,8 +270,8 @@ def _linearity(used: Sequence[Run], reference: float) -> tuple[float, float]:
 
 
 def _tables(runs: Sequence[Run], used: Sequence[Run], fit: JointFit, saturation: float) -> Mapping[str, Any]:
-    place = {id(run): index for index, run in enumerate(used)}
-    inside = [place.get(id(run), -1) for run in runs]
+    place = {run.where: index for index, run in enumerate(used)}
+    inside = [place.get(run.where, -1) for run in runs]
     residual = np.append(fit.residual, math.nan)
     scatter = np.append(fit.scatter, math.nan)
     found = [run.statistics for run in runs]

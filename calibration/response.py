@@ -20,13 +20,16 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import linalg, optimize
-from scipy.interpolate import CubicSpline
+from scipy import linalg, optimize, stats
+from scipy.interpolate import CubicSpline, PchipInterpolator
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.intp]
 
 NODES = 48
+ROUNDS = 2
+QUANTILES = 24
+SHIFT_ERROR = 0.1  # of the mean's shift by a bent response: how well its noise law is known
 UNKNOWN = 10.0  # standard deviation of the logarithm of a level that nobody stated
 BENDS = (0.0, 0.5, 1.0)  # how much of log(1 - y/top) goes into the coordinate the spline is smooth in
 
@@ -39,6 +42,8 @@ class Levels:
     ----------
     counts, counts_stderr : Floats
         Mean counts above dark of each run and their standard error.
+    shot_variance : Floats
+        Temporal variance that the light's own noise gives one pixel, counts squared; 0 if unknown.
     setting, level : Integers
         Which gain setting and which light level the run belongs to (indices).
     log_energy : Floats
@@ -57,6 +62,7 @@ class Levels:
 
     counts: Floats
     counts_stderr: Floats
+    shot_variance: Floats
     setting: Integers
     level: Integers
     log_energy: Floats
@@ -73,7 +79,8 @@ class JointFit:
     """Response and gains with their joint covariance.
 
     ``log_exposure`` at ``log_counts`` (nodes) and ``log_gain`` per setting; ``covariance`` is over
-    (nodes, settings). ``residual`` is that of each run, ``scatter`` its expected size.
+    (nodes, settings). ``residual`` is that of each run, ``scatter`` its expected size; ``counts``
+    are those of the runs with the bend's effect on noisy light taken off.
     """
 
     log_counts: Floats
@@ -82,6 +89,7 @@ class JointFit:
     covariance: Floats
     residual: Floats
     scatter: Floats
+    counts: Floats
     level_stderr: float
     run_stderr: float
     notes: tuple[str, ...] = field(default=())
@@ -118,27 +126,65 @@ def fit_jointly(levels: Levels) -> JointFit:
     """
     middle = float(np.nanmean(levels.log_energy))
     levels = replace(levels, log_energy=levels.log_energy - middle)
+    measured = levels
+    slope = np.ones(levels.counts.size)
+    centres: dict[float, Floats] = {}
+    for _ in range(ROUNDS):  # slope and bend of the curve enter the weights and the means it is solved from
+        nodes = _place_nodes(levels)
+        designs = {bend: _design(levels, nodes, slope, bend) for bend in BENDS}
+        centres = {bend: _best_sizes(designs[bend], levels, centres.get(bend)) for bend in BENDS}
+        solved = [_solve(centres[bend], designs[bend], levels) for bend in BENDS]
+        mean = min(solved, key=lambda solution: solution.value).mean[: nodes.size]
+        curve = PchipInterpolator(np.log(nodes), rising(mean))
+        levels, slope = _straightened(measured, curve)
     nodes = _place_nodes(levels)
     solutions: list[_Solution] = []
     sizes: list[Floats] = []
-    slope = np.ones(levels.counts.size)
-    best: tuple[float, _Design, Floats] | None = None
-    for _ in range(2):  # the slope of the response turns errors of counts into errors of exposure
-        best = min(
-            (_best_sizes(_design(levels, nodes, slope, bend), levels) for bend in BENDS),
-            key=lambda item: item[0],
-        )
-        mean = _solve(best[2], best[1], levels).mean[: nodes.size]
-        curve = CubicSpline(np.log(nodes), np.asarray(mean), bc_type="natural")
-        slope = np.clip(np.asarray(curve(np.log(levels.counts), 1)), 0.05, 20.0)
     for bend in BENDS:
         design = _design(levels, nodes, slope, bend)
-        _, _, centre = _best_sizes(design, levels)
-        for size in _around(centre, design, levels):
-            solutions.append(_solve(size, design, levels))
+        for size in _around(centres[bend], design, levels):
+            solutions.append(_solve(size, design, levels, with_covariance=True))
             sizes.append(size)
     fit = _average(levels, nodes, solutions, np.array(sizes))
     return replace(fit, log_exposure=fit.log_exposure + middle)
+
+
+def _straightened(measured: Levels, curve: PchipInterpolator) -> tuple[Levels, Floats]:
+    """Take off what a bent response adds to the mean counts of noisy light; give also its slope.
+
+    Light that varies has a mean answer other than the answer to its mean. Its events are taken as
+    gamma distributed with the variance that the counts show; their mean answer is a sum over
+    quantiles, not a second derivative, which a fitted curve does not give.
+    """
+    counts = measured.counts
+    low, high = curve.x[0], curve.x[-1]
+    for _ in range(3):
+        width = np.clip(np.sqrt(measured.shot_variance) / counts, 0.1, 0.5)
+        below, above = (
+            np.clip(np.log(counts * (1 - width)), low, high),
+            np.clip(np.log(counts * (1 + width)), low, high),
+        )
+        slope = np.clip((curve(above) - curve(below)) / np.maximum(above - below, 1e-9), 0.05, 20.0)
+        centre = np.asarray(curve(np.clip(np.log(counts), low, high)))
+        relative = np.clip(measured.shot_variance * (slope / counts) ** 2, 1e-12, 1.0)
+        share = (np.arange(QUANTILES) + 0.5) / QUANTILES
+        drawn = stats.gamma.ppf(share, 1.0 / relative[:, None]) * relative[:, None]
+        drawn /= drawn.mean(axis=1, keepdims=True)
+        answers = _answer(curve, centre[:, None] + np.log(np.maximum(drawn, 1e-6)))
+        shift = np.mean(answers, axis=1) - _answer(curve, centre)
+        counts = np.maximum(measured.counts - shift, 0.5 * measured.counts)
+    error = np.hypot(measured.counts_stderr, SHIFT_ERROR * np.abs(shift))
+    return replace(measured, counts=counts, counts_stderr=error), slope
+
+
+def _answer(curve: PchipInterpolator, log_exposure: Floats) -> Floats:
+    """Counts at a logarithm of exposure; straight in both logarithms beyond the curve's ends."""
+    at = np.linspace(curve.x[0], curve.x[-1], 2048)
+    values = np.asarray(curve(at))
+    inside = np.interp(log_exposure, values, at)
+    inside += np.minimum(log_exposure - values[0], 0.0) * (at[60] - at[0]) / (values[60] - values[0])
+    inside += np.maximum(log_exposure - values[-1], 0.0) * (at[-1] - at[-60]) / (values[-1] - values[-60])
+    return np.asarray(np.exp(inside))
 
 
 def _place_nodes(levels: Levels) -> Floats:
@@ -191,7 +237,7 @@ def _design(levels: Levels, nodes: Floats, slope: Floats, bend: float) -> _Desig
     )
 
 
-def _solve(size: Floats, design: _Design, levels: Levels) -> _Solution:
+def _solve(size: Floats, design: _Design, levels: Levels, *, with_covariance: bool = False) -> _Solution:
     """Solve for given (log bending scale, log level error, log run error)."""
     bend, level_error, run_error = np.exp(size)
     diagonal = design.noise + run_error**2
@@ -222,7 +268,8 @@ def _solve(size: Floats, design: _Design, levels: Levels) -> _Solution:
         + 2.0 * float(np.log(np.diag(factor[0])).sum())
         + _weak_prior(size, levels)
     )
-    return _Solution(value, mean, linalg.cho_solve(factor, np.eye(len(normal))))
+    covariance = linalg.cho_solve(factor, np.eye(len(normal))) if with_covariance else np.empty(0)
+    return _Solution(value, mean, covariance)
 
 
 def _weak_prior(size: Floats, levels: Levels) -> float:
@@ -237,20 +284,19 @@ def _weak_prior(size: Floats, levels: Levels) -> float:
     )
 
 
-def _best_sizes(design: _Design, levels: Levels) -> tuple[float, _Design, Floats]:
-    """Find the most likely bending and error sizes, from a small grid and then downhill."""
-    level_error = levels.level_stderr or 0.005
-    starts = [
-        np.log([bend, level_error, run_error]) for bend in (0.05, 0.5, 3.0) for run_error in (0.001, 0.01)
-    ]
-    start = min(starts, key=lambda size: _solve(np.asarray(size), design, levels).value)
+def _best_sizes(design: _Design, levels: Levels, start: Floats | None) -> Floats:
+    """Find the most likely bending and error sizes, downhill from ``start`` or from a small grid."""
+    if start is None:
+        level_error = levels.level_stderr or 0.005
+        grid = [np.log([bend, level_error, run]) for bend in (0.05, 0.5, 3.0) for run in (0.001, 0.01)]
+        start = min(grid, key=lambda size: _solve(size, design, levels).value)
     found = optimize.minimize(
         lambda size: _solve(np.clip(size, -12.0, 5.0), design, levels).value,
         start,
         method="Nelder-Mead",
-        options={"xatol": 0.05, "fatol": 0.05, "maxfev": 160},
+        options={"xatol": 0.05, "fatol": 0.05, "maxfev": 120},
     )
-    return float(found.fun), design, np.clip(found.x, -12.0, 5.0)
+    return np.asarray(np.clip(found.x, -12.0, 5.0))
 
 
 def _around(centre: Floats, design: _Design, levels: Levels) -> list[Floats]:
@@ -291,6 +337,7 @@ def _average(levels: Levels, nodes: Floats, solutions: list[_Solution], sizes: F
         log_gain=log_gain,
         covariance=covariance,
         residual=residual,
+        counts=levels.counts,
         scatter=np.sqrt(noise**2 + level_stderr**2 + run_stderr**2),
         level_stderr=float(level_stderr),
         run_stderr=float(run_stderr),

@@ -182,7 +182,9 @@ def _gaps(by_setting: Mapping[float, Sequence[Run]]) -> list[Fault]:
     ]
 
 
-def levels_of(runs: Sequence[Run], series: Series, saturation_above_dark: float) -> Levels:
+def levels_of(
+    runs: Sequence[Run], series: Series, *, dark_variance: Mapping[float, float], saturation_above_dark: float
+) -> Levels:
     """Put usable runs into the form of the joint fit."""
     gains = series.settings
     names: list[object] = []
@@ -204,6 +206,7 @@ def levels_of(runs: Sequence[Run], series: Series, saturation_above_dark: float)
     return Levels(
         counts=np.array([run.statistics.mean for run in runs]),
         counts_stderr=np.array([run.statistics.mean_stderr for run in runs]),
+        shot_variance=np.array([_shot_variance(run, dark_variance[run.key.gain]) for run in runs]),
         setting=np.array([gains.index(run.key.gain) for run in runs], dtype=np.intp),
         level=np.array(level, dtype=np.intp),
         log_energy=log_energy,
@@ -214,6 +217,11 @@ def levels_of(runs: Sequence[Run], series: Series, saturation_above_dark: float)
         known_log_gain=known - known[gains.index(reference)],
         known_stderr=setup.known_gain_stderr,
     )
+
+
+def _shot_variance(run: Run, dark_variance: float) -> float:
+    variance = run.statistics.variance - dark_variance
+    return max(variance, 0.0) if math.isfinite(variance) else 0.0
 
 
 def reference_of(runs: Sequence[Run], series: Series) -> float:

@@ -63,6 +63,13 @@ class Region:
         means = self.block_sums(picture * self.weights)[full] / self.block_pixels[full]
         return self.mean(picture), float(np.std(means, ddof=1) / np.sqrt(means.size))
 
+    def lost_to_block_means(self, lags: Floats) -> float:
+        """Variance that taking off each block's mean removes from noise that neighbours share."""
+        pixels = float(np.median(self.block_pixels))
+        height, width = (length // self.blocks for length in self.mask.shape)
+        share = pixels / (height * width)
+        return share * float(lags.sum() - lags[LAG_REACH, LAG_REACH]) / pixels
+
     def block_sums(self, picture: Map) -> Floats:
         """Sum of a picture over each block; edges that do not fill a block are left out."""
         count = self.blocks
@@ -200,7 +207,9 @@ class Tally:
         full = self._region.block_pixels > 0.2 * self._region.block_pixels.max()
         blocks = np.mean([pair[full] for pair in pairs], axis=0) if pairs else np.full(2, np.nan)
         weights = self._region.block_pixels[full] if pairs else np.ones(2)
-        variance = float(np.average(blocks, weights=weights))
+        lags = np.mean(self._lags, axis=0) if self._lags else np.zeros((2 * LAG_REACH + 1,) * 2)
+        lost = self._region.lost_to_block_means(lags)
+        variance = float(np.average(blocks, weights=weights)) + lost
         kept = means[good]
         scatter = float(np.var(kept, ddof=1)) / kept.size if kept.size > 1 else 0.0
         floor = (variance if np.isfinite(variance) else 0.0) / (self._region.pixels * kept.size)
@@ -211,7 +220,7 @@ class Tally:
             mean_stderr=float(np.sqrt(max(scatter, floor))),
             variance=variance,
             variance_stderr=float(np.std(blocks, ddof=1) / np.sqrt(blocks.size)),
-            lags=np.mean(self._lags, axis=0) if self._lags else np.zeros((2 * LAG_REACH + 1,) * 2),
+            lags=lags,
             lag_count=len(self._lags),
             pixels=self._region.pixels,
             largest=self._largest,
