@@ -97,7 +97,8 @@ class Response:
         reach = np.maximum(0.1 * counts, np.asarray(noise))
         low, high = np.maximum(counts - reach, table[0]), np.minimum(counts + reach, table[-1])
         rise = np.interp(high, table, exposure) - np.interp(low, table, exposure)
-        return np.asarray(rise / np.maximum(high - low, 1e-12))
+        inside = rise / np.where(high > low, high - low, 1.0)
+        return np.asarray(np.where(counts < table[0], self._chord, inside))
 
     def node_weights(self, counts: Floats) -> Floats:
         """How much each node says at some counts above dark (points x nodes), for its covariance."""

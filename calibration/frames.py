@@ -107,9 +107,14 @@ def pictures(path: Path) -> Iterator[NDArray[np.generic]]:
     try:
         with tifffile.TiffFile(path) as tiff:
             series = tiff.series[0]
-            if len(series.pages) == 1:
-                whole = series.asarray()
-                yield from whole.reshape(-1, *whole.shape[-2:])
+            if series.dataoffset is not None:
+                # Uncompressed and in one piece: mapped, so that a long stack is never in memory whole.
+                dtype = np.dtype(series.dtype).newbyteorder(tiff.byteorder)
+                whole = np.memmap(path, dtype, "r", series.dataoffset, series.shape)
+                for picture in whole.reshape(-1, *series.shape[-2:]):
+                    yield np.array(picture, dtype=series.dtype)
+            elif len(series.pages) == 1:
+                yield from series.asarray().reshape(-1, *series.shape[-2:])
             else:
                 for page in series.pages:
                     yield page.asarray()

@@ -33,7 +33,7 @@ class Evidence:
     response: Response
     gains: tuple[float, ...]
     log_gain: Floats
-    log_gain_stderr: Floats
+    log_gain_stderr: Sequence[float]
     transfers: Sequence[Transfer]
     shot_systematic: Sequence[float]
     darks: Mapping[float, DarkField]

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from calibration import frames
-from calibration.correct import typical_pixels
 from calibration.curve import Response
 from calibration.folder import Series, read_folder
 from calibration.merit import Evidence, figures_of_merit, linearity_error
@@ -64,8 +63,8 @@ def calibrate(
     series = read_folder(folder, pattern=pattern)
     reader = Reader(series, progress or (lambda text: None))
     darks, defects = dark_fields(reader)
-    flats, runs = flat_fields(reader, darks, defects)
-    runs = runs + light_runs(reader, darks, flats, defects)
+    flats, typical, runs = flat_fields(reader, darks, defects)
+    runs = runs + light_runs(reader, darks, typical)
     saturation = saturation_of(runs, series.setup)
     reader.faults += faults_of_runs(runs, series, saturation)
     reader.stop_if_faulty()
@@ -84,7 +83,7 @@ def calibrate(
     straightened = {run.where: run for run in used}
     runs = [straightened.get(run.where, run) for run in runs]
     response = _response(fit, used, saturation - lowest_dark)
-    flat_maps = {gain: _sensitivity(field, response, good) for gain, field in flats.items()}
+    flat_maps = {gain: _sensitivity(field, response, typical, good) for gain, field in flats.items()}
     transfers, systematic = _transfers(series, runs, darks, fit, response, saturation, reader)
     reference = reference_of(used, series)
     nodes = fit.log_counts.size
@@ -93,7 +92,7 @@ def calibrate(
         response=response,
         gains=series.settings,
         log_gain=fit.log_gain,
-        log_gain_stderr=np.sqrt(np.diag(fit.covariance)[nodes:]),
+        log_gain_stderr=np.sqrt(np.diag(fit.covariance)[nodes:]).tolist(),
         transfers=transfers,
         shot_systematic=systematic,
         darks=darks,
@@ -148,10 +147,12 @@ def _response(fit: JointFit, used: Sequence[Run], saturation_above_dark: float) 
     return Response(fit.log_counts, fit.log_exposure, max(limit, brightest.statistics.mean))
 
 
-def _sensitivity(field: FlatField, response: Response, good: NDArray[np.bool_]) -> NDArray[np.float32]:
+def _sensitivity(
+    field: FlatField, response: Response, typical: NDArray[np.bool_], good: NDArray[np.bool_]
+) -> NDArray[np.float32]:
     """Relative sensitivity of each pixel; 1 for the typical pixel, and where a bad one has none."""
     exposure = response.exposure(np.minimum(field.picture.astype(np.float64), response.limit))
-    relative = exposure / float(exposure[typical_pixels(field.picture, good)].mean())
+    relative = exposure / float(exposure[typical].mean())
     return np.where(good & (relative > 0.0), relative, 1.0).astype(np.float32)
 
 
@@ -239,10 +240,7 @@ def _settings(
     even = np.ones(series.shape, dtype=np.float32)
     settings = []
     for gain, transfer in zip(series.settings, transfers, strict=True):
-        flat_stderr = 0.0
-        if gain in flats:
-            found = flats[gain].run.statistics
-            flat_stderr = math.sqrt(max(np.nan_to_num(found.variance), 0.0) / found.frames) / found.mean
+        flat_stderr = flats[gain].relative_noise if gain in flats else 0.0
         settings.append(
             Setting(
                 dark=darks[gain].picture,

@@ -41,6 +41,12 @@ class FlatField:
     picture: Map
     run: Run
 
+    @property
+    def relative_noise(self) -> float:
+        """Temporal noise left in one pixel of the mean picture, relative to the mean."""
+        found = self.run.statistics
+        return float(np.sqrt(max(np.nan_to_num(found.variance), 0.0) / found.frames) / max(found.mean, 1e-9))
+
 
 def dark_fields(reader: Reader) -> tuple[dict[float, DarkField], NDArray[np.uint8]]:
     """Sum up the dark frames of every setting and find hot and blinking pixels."""
@@ -81,8 +87,13 @@ def dark_fields(reader: Reader) -> tuple[dict[float, DarkField], NDArray[np.uint
 
 def flat_fields(
     reader: Reader, darks: Mapping[float, DarkField], defects: NDArray[np.uint8]
-) -> tuple[dict[float, FlatField], list[Run]]:
-    """Sum up the flat frames and find dead pixels; the best exposed run of each setting is its flat."""
+) -> tuple[dict[float, FlatField], NDArray[np.bool_], list[Run]]:
+    """Sum up the flat frames, find dead pixels and the typical ones.
+
+    The best exposed run of each setting is its flat. The typical pixels, over which all light is
+    averaged, are the same at every setting (from the least noisy flat): else the gain would be
+    compared between different pixels.
+    """
     fields: dict[float, FlatField] = {}
     runs = []
     middle = 0.5 * reader.series.setup.full_scale
@@ -104,40 +115,24 @@ def flat_fields(
         reader.notes.append(
             "no flat frames: all pixels are taken as equally sensitive, dead ones are not found"
         )
-        return {}, runs
-    return _for_every_setting(fields, reader, "flat"), _over_typical(runs, fields, defects)
+        return {}, defects == 0, runs
+    best = min(fields.values(), key=lambda field: field.relative_noise)
+    typical = typical_pixels(best.picture, defects == 0)
+    kept = {field.run.where: field for field in fields.values()}
+    runs = [
+        run.with_mean(float(kept[run.where].picture[typical].mean(dtype=np.float64)))
+        for run in runs
+        if run.where in kept
+    ]
+    return _for_every_setting(fields, reader, "flat"), typical, runs
 
 
-def _over_typical(
-    runs: list[Run], fields: Mapping[float, FlatField], defects: NDArray[np.uint8]
-) -> list[Run]:
-    """Take the mean of the flat runs that are kept as pictures over the typical pixels."""
-    kept = []
-    for run in runs:
-        field = fields[run.key.gain]
-        if field.run is not run:
-            kept.append(run)
-            continue
-        typical = typical_pixels(field.picture, defects == 0)
-        kept.append(run.with_mean(float(field.picture[typical].mean(dtype=np.float64))))
-    return kept
-
-
-def light_runs(
-    reader: Reader,
-    darks: Mapping[float, DarkField],
-    flats: Mapping[float, FlatField],
-    defects: NDArray[np.uint8],
-) -> list[Run]:
-    """Sum up the response and gain frames over the typical pixels of their setting."""
-    good = defects == 0
-    regions: dict[float, Region] = {}
+def light_runs(reader: Reader, darks: Mapping[float, DarkField], typical: NDArray[np.bool_]) -> list[Run]:
+    """Sum up the response and gain frames over the typical pixels."""
+    region = Region(typical)
     runs = []
     for key, rows in grouped(reader.series.rows, kinds=("response", "gain")).items():
-        if key.gain not in regions:
-            mask = typical_pixels(flats[key.gain].picture, good) if key.gain in flats else good
-            regions[key.gain] = Region(mask)
-        tally = reader.gather(rows, regions[key.gain], dark=darks[key.gain].picture)
+        tally = reader.gather(rows, region, dark=darks[key.gain].picture)
         if tally is not None:
             runs.append(Run(key, tuple(rows), tally.statistics()))
     reader.stop_if_faulty()

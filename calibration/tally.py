@@ -68,7 +68,7 @@ class Region:
         pixels = float(np.median(self.block_pixels))
         height, width = (length // self.blocks for length in self.mask.shape)
         share = pixels / (height * width)
-        return share * float(lags.sum() - lags[LAG_REACH, LAG_REACH]) / pixels
+        return float(share * (lags.sum() - lags[LAG_REACH, LAG_REACH]) / pixels)
 
     def block_sums(self, picture: Map) -> Floats:
         """Sum of a picture over each block; edges that do not fill a block are left out."""

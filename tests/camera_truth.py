@@ -154,7 +154,7 @@ def write_folder(camera: TrueCamera, folder: Path, plan: Plan, *, seed: int) -> 
         name = f"{kind}_{len(rows):03d}.tif"
         stack = np.stack([camera.frame(true_energy, gain, rng) for _ in range(count)])
         tifffile.imwrite(folder / name, stack, photometric="minisblack")
-        rows.append([name, kind, "" if energy is None else repr(energy), gain, 3])
+        rows.append([name, kind, "" if energy is None else repr(float(energy)), gain, 3])
 
     reference = next(iter(camera.gains))
     shares = np.geomspace(plan.low, plan.high, plan.levels)
