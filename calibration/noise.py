@@ -73,8 +73,7 @@ def fit_transfer(points: TransferPoints) -> Transfer:
     """Fit dark variance and shot noise to the points, outliers weighing little (Huber)."""
     variance = np.append(points.variance, points.dark_variance)
     lever = np.append(points.lever, 0.0)
-    error = np.append(points.variance_stderr, points.dark_variance_stderr)
-    error = np.sqrt(error**2 + (2e-3 * variance) ** 2)
+    error = np.append(np.hypot(points.variance_stderr, 2e-3 * points.variance), points.dark_variance_stderr)
     scale = float(lever.max()) or 1.0
     design = np.stack([np.ones(lever.size), lever / scale], axis=1) / error[:, None]
     target = variance / error
@@ -89,7 +88,7 @@ def fit_transfer(points: TransferPoints) -> Transfer:
     correlation, total, total_stderr = _spread(points)
     return Transfer(
         read_variance=float(max(line[0], 0.0)),
-        read_variance_stderr=float(np.sqrt(spread[0, 0] * birge)),
+        read_variance_stderr=float(np.sqrt(spread[0, 0])),
         shot=float(max(line[1], 0.0) / scale),
         shot_stderr=float(np.sqrt(spread[1, 1] * birge) / scale),
         correlation=correlation,
@@ -123,7 +122,7 @@ def _spread(points: TransferPoints) -> tuple[Floats, float, float]:
     significant = np.flatnonzero(np.abs(sums[1:]) > 2.5 * errors[1:]) + 1
     last = int(significant.max()) if significant.size else 0
     kept = np.where(ring <= last, correlation, 0.0)
-    error = float(np.sqrt((errors[1 : last + 1] ** 2).sum() + errors[min(last + 1, reach)] ** 2 / 4.0))
+    error = float(np.sqrt((errors[1 : last + 1] ** 2).sum() + errors[min(last + 1, reach)] ** 2 / 16.0))
     return kept, max(float(kept.sum()), 1e-3), error
 
 
@@ -139,7 +138,8 @@ def event_energy(per_setting: Floats, stderr: Floats, gain: Floats) -> EventEner
     """Separate the intensifier's events from the sensor's own shot noise.
 
     The variance per energy and gain, q(G) = q + c/G: the part q is the light's events (it becomes
-    QE/F^2), c the shot noise of the sensor behind the intensifier, which a high gain drowns.
+    QE/F^2), c the shot noise of the sensor behind the intensifier, which a high gain drowns. c is
+    let in only where the settings differ by more than their errors without it (2 sigma).
 
     Parameters
     ----------
@@ -148,18 +148,22 @@ def event_energy(per_setting: Floats, stderr: Floats, gain: Floats) -> EventEner
     gain : Floats
         Relative gain of each setting.
     """
-    if per_setting.size < 2 or gain.max() < 1.5 * gain.min():
-        index = int(np.argmin(stderr / per_setting))
-        return EventEnergy(float(per_setting[index]), float(stderr[index]), 0.0)
     design = np.stack([np.ones(gain.size), gain.max() / gain], axis=1) / stderr[:, None]
-    found = optimize.lsq_linear(design, per_setting / stderr, bounds=(0.0, np.inf))
-    active = found.x > 0.0
-    spread = np.linalg.inv(design[:, active].T @ design[:, active])
-    rest = per_setting / stderr - design @ found.x
-    birge = max(1.0, float(rest @ rest) / max(1, gain.size - int(active.sum())))
-    return EventEnergy(
-        float(found.x[0]), float(np.sqrt(spread[0, 0] * birge)), float(found.x[1] * gain.max())
-    )
+    target = per_setting / stderr
+    weight = float(design[:, 0] @ design[:, 0])
+    alone = float(design[:, 0] @ target) / weight
+    misfit = float(np.sum((target - alone * design[:, 0]) ** 2))
+    if gain.size > 1:
+        both, _ = optimize.nnls(design, target)
+        rest = float(np.sum((target - design @ both) ** 2))
+        if both.min() > 0.0 and misfit - rest > 4.0:
+            spread = np.linalg.inv(design.T @ design)
+            birge = max(1.0, rest / max(1, gain.size - 2))
+            return EventEnergy(
+                float(both[0]), float(np.sqrt(spread[0, 0] * birge)), float(both[1] * gain.max())
+            )
+    birge = max(1.0, misfit / max(1, gain.size - 1))
+    return EventEnergy(alone, float(np.sqrt(birge / weight)), 0.0)
 
 
 def spreading_kernel(correlation: Floats) -> Floats:

@@ -43,11 +43,13 @@ class Score:
 
     error: list[float] = field(default_factory=list)
     held: list[float] = field(default_factory=list)
+    normal: list[float] = field(default_factory=list)
 
     def add(self, value: float, truth: float, stderr: float) -> None:
         """Take in one value; ``stderr`` absolute."""
         self.error.append(abs(value / truth - 1.0))
         self.held.append(float(abs(value - truth) <= 1.96 * stderr))
+        self.normal.append((value - truth) / stderr)
 
 
 def figure(camera: calibration.Calibration, name: str, gain: float | None = None) -> calibration.Figure:
@@ -153,6 +155,7 @@ def main() -> None:
             _print(quantity, score)
             pooled.setdefault(quantity, Score()).error.extend(score.error)
             pooled[quantity].held.extend(score.held)
+            pooled[quantity].normal.extend(score.normal)
         sys.stdout.flush()
     sys.stdout.write("all cases\n")
     for quantity, score in pooled.items():
@@ -161,7 +164,10 @@ def main() -> None:
 
 def _print(quantity: str, score: Score) -> None:
     error = 100.0 * np.array(score.error)
-    held = f"  95 % interval holds {100 * np.mean(score.held):5.1f} %" if score.held else ""
+    held = ""
+    if score.held:
+        size = np.sqrt(np.mean(np.square(score.normal)))
+        held = f"  95 % interval holds {100 * np.mean(score.held):5.1f} %  error/stated {size:.2f} rms"
     sys.stdout.write(
         f"  {quantity:20s} median {np.median(error):8.4f} %  p95 {np.quantile(error, 0.95):8.4f} %  "
         f"max {error.max():8.4f} %{held}\n"

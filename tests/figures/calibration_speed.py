@@ -73,8 +73,8 @@ def main() -> None:
         seconds = used.ru_utime + used.ru_stime - before.ru_utime - before.ru_stime
     sys.stdout.write(
         f"{frames} frames of {SHAPE[0]} x {SHAPE[1]}, 16 bit\n"
-        f"plain reading {reading:6.1f} s wall {reading_cpu:6.1f} s CPU {1e3 * reading_cpu / frames:6.1f} ms/frame\n"
-        f"calibration   {wall:6.1f} s wall {seconds:6.1f} s CPU {1e3 * seconds / frames:6.1f} ms/frame\n"
+        f"plain reading {reading:.1f} s wall {reading_cpu:.1f} s CPU {1e3 * reading_cpu / frames:.1f} ms/frame\n"
+        f"calibration   {wall:.1f} s wall {seconds:.1f} s CPU {1e3 * seconds / frames:.1f} ms/frame\n"
         f"peak memory     {used.ru_maxrss / 1024:6.0f} MB\n"
     )
 
