@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 from calibration import frames
 from calibration.curve import Response
 from calibration.folder import Series, read_folder
+from calibration.levels import Levels
 from calibration.merit import Evidence, figures_of_merit, linearity_error
 from calibration.model import Calibration
 from calibration.noise import Transfer, TransferPoints, fit_transfer
 from calibration.reader import Progress, Reader
-from calibration.response import JointFit, Levels, fit_jointly, rising
+from calibration.response import JointFit, fit_jointly, rising
 from calibration.runs import Run, clipped, faults_of_runs, levels_of, reference_of, saturation_of, usable
 from calibration.setting import Setting
 from calibration.stages import DarkField, FlatField, dark_fields, flat_fields, light_runs

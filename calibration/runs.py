@@ -12,7 +12,7 @@ import numpy as np
 
 from calibration.errors import Fault
 from calibration.folder import Row, Series
-from calibration.response import Levels
+from calibration.levels import Levels
 from calibration.setup import Setup
 from calibration.tally import RunStatistics
 

@@ -71,12 +71,12 @@ def main() -> None:
         wall = time.perf_counter() - started
         used = resource.getrusage(resource.RUSAGE_CHILDREN)
         seconds = used.ru_utime + used.ru_stime - before.ru_utime - before.ru_stime
-    sys.stdout.write(
-        f"{frames} frames of {SHAPE[0]} x {SHAPE[1]}, 16 bit\n"
-        f"plain reading {reading:.1f} s wall {reading_cpu:.1f} s CPU {1e3 * reading_cpu / frames:.1f} ms/frame\n"
-        f"calibration   {wall:.1f} s wall {seconds:.1f} s CPU {1e3 * seconds / frames:.1f} ms/frame\n"
-        f"peak memory     {used.ru_maxrss / 1024:6.0f} MB\n"
-    )
+    sys.stdout.write(f"{frames} frames of {SHAPE[0]} x {SHAPE[1]}, 16 bit\n")
+    for name, clock, cpu in (("plain reading", reading, reading_cpu), ("calibration", wall, seconds)):
+        sys.stdout.write(
+            f"{name:14s}{clock:7.1f} s wall{cpu:7.1f} s CPU{1e3 * cpu / frames:7.1f} ms a frame\n"
+        )
+    sys.stdout.write(f"peak memory {used.ru_maxrss / 1024:.0f} MB\n")
 
 
 if __name__ == "__main__":
