@@ -88,8 +88,8 @@ def check_index(index: complex) -> None:
     Raises
     ------
     InputError
-        The index is outside 0.01 to 100 in n or 0 to 100 in k.
+        The index is outside 1e-3 to 1e6 in n or 0 to 1e6 in k.
     """
     value = complex(index)
-    check("index (real part)", value.real, 0.01, 100.0)
-    check("index (imaginary part)", abs(value.imag), 0.0, 100.0)
+    check("index (real part)", value.real, 1e-3, 1e6)
+    check("index (imaginary part)", abs(value.imag), 0.0, 1e6)
