@@ -14,16 +14,19 @@ from typing import Any
 
 import numpy as np
 
-from imclab.transport.beam_field import beam_irradiance
+from imclab.transport.beam_field import LEAST_SIGMA, beam_irradiance
 from imclab.transport.gathering import gate_share, time_bin
 from imclab.transport.kernel_cache import cached_kernel, device
 from imclab.transport.random import uniforms
 from imclab.transport.scattering import phase_density, sample_deviation, turn
+from imclab.transport.setup import PULSE_REACH, Setup
 
 BACKSCATTER_STREAM = 31
 ROULETTE_WEIGHT = 0.02
 ROULETTE_CHANCE = 0.2
 MOST_EVENTS = 100_000
+CORE_REACH = 1.5
+"""Standard deviations of the pulse by which the open gate is widened where joins are drawn evenly."""
 TURN_TO_LASER = 0.25
 """Chance of drawing a scattered direction around the way back to the laser instead of the flight's.
 
@@ -39,11 +42,12 @@ def deviation_of(u: Any, v: Any) -> Any:
 
 
 @device
-def _join_place(origin: Any, direction: Any, limits: Any, scales: Any, u: Any) -> Any:
+def _join_place(origin: Any, direction: Any, limits: Any, core: Any, scales: Any, u: Any) -> Any:
     """Draw a distance along a ray for the join with the beam; return it and its density.
 
-    ``limits`` are the first and last distance wanted, ``scales`` (attenuation of both ways, 1/m;
-    length that separates near from far, m).
+    ``limits`` are the first and last distance wanted, ``core`` those between which the gate is wide
+    open, ``scales`` the attenuation of both ways (1/m) and two lengths (m): what separates near from
+    far, and the width below which the beam does not narrow.
     """
     first, last = limits
     length = last - first
@@ -51,34 +55,41 @@ def _join_place(origin: Any, direction: Any, limits: Any, scales: Any, u: Any) -
     near = scales[1]
     closest = -(origin[0] * direction[0] + origin[1] * direction[1] + origin[2] * direction[2])
     square = origin[0] ** 2 + origin[1] ** 2 + origin[2] ** 2 - closest * closest
-    height = max(math.sqrt(max(square, 0.0)), 0.1 * near)
+    height = max(math.sqrt(max(square, 0.0)), scales[2])
     low, high = math.atan((first - closest) / height), math.atan((last - closest) / height)
     fall = -math.expm1(-rate * length)
     ratio = math.log((last + near) / (first + near))
-    choice = 3.0 * u
+    width = core[1] - core[0]
+    kinds = 4.0 if width > 0.0 else 3.0
+    choice = kinds * u
     if choice < 1.0:
         place = closest + height * math.tan(low + choice * (high - low))
     elif choice < 2.0:
         place = first - math.log1p(-(choice - 1.0) * fall) / rate
-    else:
+    elif choice < 3.0:
         place = (first + near) * math.exp((choice - 2.0) * ratio) - near
+    else:
+        place = core[0] + (choice - 3.0) * width
     place = min(max(place, first), last)
     density = height / ((high - low) * (height * height + (place - closest) ** 2))
     density += rate * math.exp(-rate * (place - first)) / fall
     density += 1.0 / (ratio * (place + near))
-    return place, density / 3.0
+    if width > 0.0 and core[0] <= place <= core[1]:
+        density += 1.0 / width
+    return place, density / kinds
 
 
 @device
-def _arrival_limits(setup: Any, origin: Any, direction: Any, path: Any, length: Any) -> Any:
+def _arrival_limits(setup: Any, origin: Any, direction: Any, path: Any, length: Any, margin: Any) -> Any:
     """Return the part of a stretch whose light, straight from the laser, arrives while the gate is open.
 
+    The gate is widened by ``margin`` standard deviations of the pulse on both sides.
     s + |origin + s u| = T has the root (T² − |o|²)/(2 (T + o·u)).
     """
     first, last = 0.0, length
     if setup.gate.opens == -math.inf:
         return first, last
-    margin = 6.0 * setup.gate.sigma
+    margin *= setup.gate.sigma
     square = origin[0] ** 2 + origin[1] ** 2 + origin[2] ** 2
     along = origin[0] * direction[0] + origin[1] * direction[1] + origin[2] * direction[2]
     soonest = (setup.gate.opens - margin) * setup.water.group_velocity - path
@@ -97,13 +108,16 @@ def _join(setup: Any, origin: Any, direction: Any, stretch: Any, draw: Any) -> A
     ``stretch`` is (length of the stretch, path before it, weight); ``draw`` (seed, history, event).
     """
     length, path, weight = stretch
-    first, last = _arrival_limits(setup, origin, direction, path, length)
+    first, last = _arrival_limits(setup, origin, direction, path, length, PULSE_REACH)
     if not last > first:
         return 0.0, 0.0
     water = setup.water
     u0, u1, u2, _ = uniforms(draw[0], draw[1], draw[2], BACKSCATTER_STREAM + 1)
-    scales = (2.0 * water.attenuation, setup.receiver.radius)
-    place, density = _join_place(origin, direction, (first, last), scales, u0)
+    scales = (2.0 * water.attenuation, setup.receiver.radius, max(setup.beam.spot_sigma, LEAST_SIGMA))
+    core = (0.0, -1.0)
+    if setup.gate.opens != -math.inf:
+        core = _arrival_limits(setup, origin, direction, path, length, CORE_REACH)
+    place, density = _join_place(origin, direction, (first, last), core, scales, u0)
     point = (
         origin[0] + place * direction[0],
         origin[1] + place * direction[1],
@@ -122,25 +136,31 @@ def _join(setup: Any, origin: Any, direction: Any, stretch: Any, draw: Any) -> A
 
 
 @device
-def _new_direction(setup: Any, point: Any, direction: Any, turned: Any, draws: Any) -> Any:
-    """Draw a scattered direction, perhaps around the way to the laser; return it, its weight, the choice."""
+def _new_direction(setup: Any, point: Any, direction: Any, peak: Any, draws: Any) -> Any:
+    """Draw a scattered direction, perhaps around the way to the laser; return it and its weight.
+
+    The join of a ray that misses the laser by an angle α is worth 1/α: around the way to the laser the
+    density is therefore that of α, ∝ 1/(peak² + α²), and not that of a solid angle.
+    """
     u_choice, u_scatter, u_azimuth = draws
     sine, cosine = math.sin(2.0 * math.pi * u_azimuth), math.cos(2.0 * math.pi * u_azimuth)
-    deviation = sample_deviation(setup.phase, u_scatter)
-    if turned:
-        return turn(direction, deviation, sine, cosine), 1.0, True
     away = 1.0 / math.sqrt(point[0] ** 2 + point[1] ** 2 + point[2] ** 2)
     home = (-point[0] * away, -point[1] * away, -point[2] * away)
-    homeward = u_choice < TURN_TO_LASER
-    leaving = turn(home if homeward else direction, deviation, sine, cosine)
+    reach = math.atan(math.pi / peak)
+    if u_choice < TURN_TO_LASER:
+        miss = math.sin(0.5 * peak * math.tan(u_scatter * reach))
+        leaving = turn(home, 2.0 * miss * miss, sine, cosine)
+    else:
+        leaving = turn(direction, sample_deviation(setup.phase, u_scatter), sine, cosine)
     wanted = phase_density(setup.phase, deviation_of(direction, leaving))
-    drawn = TURN_TO_LASER * phase_density(setup.phase, deviation_of(home, leaving))
-    return leaving, wanted / ((1.0 - TURN_TO_LASER) * wanted + drawn), homeward
+    angle = max(2.0 * math.asin(math.sqrt(0.5 * deviation_of(home, leaving))), 1e-9)
+    drawn = peak / (reach * (peak * peak + angle * angle) * 2.0 * math.pi * max(math.sin(angle), 1e-9))
+    return leaving, wanted / ((1.0 - TURN_TO_LASER) * wanted + TURN_TO_LASER * drawn)
 
 
 @device
 def line_of_sight(setup: Any, u: Any) -> Any:
-    """Draw a point of the picture and one of the aperture; return aperture point, direction, weight, cell."""
+    """Draw a point of the picture and one of the aperture; return where, direction, weight, place."""
     target, receiver = setup.target, setup.receiver
     across, down = min(u[0], 1.0 - 1e-12), min(u[1], 1.0 - 1e-12)
     radius, angle = receiver.radius * math.sqrt(u[2]), 2.0 * math.pi * u[3]
@@ -154,24 +174,49 @@ def line_of_sight(setup: Any, u: Any) -> Any:
     weight *= cosine**4 / (dz * dz)
     if cosine < receiver.cos_half_view:
         weight = 0.0
-    cell = int(down * receiver.rows), int(across * receiver.columns)
-    return (x, y, receiver.z), (dx * inverse, dy * inverse, cosine), weight, cell
+    return (x, y, receiver.z), (dx * inverse, dy * inverse, cosine), weight, (down, across)
+
+
+@device
+def _enter(tally: Any, tents: bool, seen: Any, energy: Any) -> None:
+    """Enter energy at a place of the picture, (down, across) from 0 to 1, into pixels or tents."""
+    rows, columns = tally.shape
+    if not tents:
+        tally[int(seen[0] * rows), int(seen[1] * columns)] += energy
+        return
+    y, x = seen[0] * (rows - 1), seen[1] * (columns - 1)
+    row, column = int(y), int(x)
+    down, across = y - row, x - column
+    tally[row, column] += energy * (1.0 - down) * (1.0 - across)
+    tally[row, column + 1] += energy * (1.0 - down) * across
+    tally[row + 1, column] += energy * down * (1.0 - across)
+    tally[row + 1, column + 1] += energy * down * across
 
 
 @cached_kernel
 def backscatter_walks(
-    setup: Any, latest: float, seed: Any, first: Any, count: int, picture: Any, times: Any
+    setup: Any,
+    peak: float,
+    latest: float,
+    tents: bool,
+    seed: Any,
+    first: Any,
+    count: int,
+    picture: Any,
+    times: Any,
 ) -> None:
-    """Add the backscatter of ``count`` walks to a picture and to the impulse time bins, energies summed."""
+    """Add the backscatter of ``count`` walks to a picture and to the impulse time bins, energies summed.
+
+    ``peak`` is the width of the phase function's forward peak, rad; ``tents`` tells what ``picture`` is
+    made of, see `smooth_map`.
+    """
     water, target = setup.water, setup.target
     mean_free_path = 1.0 / max(water.attenuation, 1e-30)
     for i in range(count):
         history = first + np.uint64(i)
-        point, direction, weight, (row, column) = line_of_sight(
-            setup, uniforms(seed, history, 0, BACKSCATTER_STREAM)
-        )
+        point, direction, weight, seen = line_of_sight(setup, uniforms(seed, history, 0, BACKSCATTER_STREAM))
         floor = ROULETTE_WEIGHT * weight
-        path, turned = 0.0, False
+        path = 0.0
         for event in range(1, MOST_EVENTS):
             if weight == 0.0 or path > latest * water.group_velocity:
                 break
@@ -183,7 +228,7 @@ def backscatter_walks(
                 length = 1e30
             energy, arrival = _join(setup, point, direction, (length, path, weight), (seed, history, event))
             if energy > 0.0:
-                picture[row, column] += energy * gate_share(setup.gate, arrival)
+                _enter(picture, tents, seen, energy * gate_share(setup.gate, arrival))
                 bin_ = time_bin(setup.time, arrival)
                 if bin_ >= 0:
                     times[bin_] += energy
@@ -197,8 +242,8 @@ def backscatter_walks(
                 point[2] + free * direction[2],
             )
             path += free
-            direction, factor, turned = _new_direction(
-                setup, point, direction, turned, (u_choice, u_scatter, u_azimuth)
+            direction, factor = _new_direction(
+                setup, point, direction, peak, (u_choice, u_scatter, u_azimuth)
             )
             weight *= factor * water.albedo
             if weight < floor:
@@ -206,3 +251,17 @@ def backscatter_walks(
                 if dice > ROULETTE_CHANCE:
                     break
                 weight /= ROULETTE_CHANCE
+
+
+def peak_angle(setup: Setup) -> float:
+    """Return the median scattering angle, rad, at least 1e-4."""
+    deviations = np.sort(_deviations(setup, 1001))
+    return max(2.0 * math.asin(math.sqrt(0.5 * float(deviations[500]))), 1e-4)
+
+
+@cached_kernel
+def _deviations(setup: Any, count: int) -> Any:
+    deviations = np.empty(count)
+    for i in range(count):
+        deviations[i] = sample_deviation(setup.phase, (i + 0.5) / count)
+    return deviations

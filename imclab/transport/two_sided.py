@@ -19,12 +19,13 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from imclab.transport.backscatter_walk import backscatter_walks
+from imclab.transport.backscatter_walk import backscatter_walks, peak_angle
 from imclab.transport.camera_walk import camera_walks
 from imclab.transport.direct_light import DirectLight, coverage_of, direct_light, rules_for
 from imclab.transport.light_walk import LightMaps, MapAxes, light_walks
 from imclab.transport.runner import Estimator, Tally
 from imclab.transport.setup import PULSE_REACH, Setup
+from imclab.transport.smooth_map import smooth_map
 from imclab.transport.target_radiance import gate_table, gated_radiance, map_axes
 
 FloatArray = NDArray[np.float64]
@@ -47,11 +48,12 @@ def make(setup: Setup) -> Estimator:
     if setup.time.bins:
         exact["time"] = direct.times
     scatters = setup.water.scattering > 0.0
+    peak, veil = peak_angle(setup), smooth_map(setup)
     table = gate_table(setup, axes, direct)
     unscattered = _seen_unscattered(setup, axes, direct, coverage)
 
     def batch(seed: int, first_history: int, count: int) -> Tally:
-        picture, backscatter = np.zeros_like(coverage), np.zeros((receiver.rows, receiver.columns))
+        picture, backscatter = np.zeros_like(coverage), np.zeros(veil.shape)
         times = np.zeros(setup.time.bins)
         if scatters:
             run = (np.uint64(seed), np.uint64(first_history), count)
@@ -60,11 +62,11 @@ def make(setup: Setup) -> Estimator:
             radiance, seen = gated_radiance(setup, axes, table, direct, coverage, maps)
             camera = camera_walks(setup, axes, direct, coverage, radiance, ROW_STEP, *run)
             picture = count * seen + camera.picture
-            backscatter_walks(setup, latest, *run, backscatter, times)
+            backscatter_walks(setup, peak, latest, veil.tents, *run, backscatter, times)
             if setup.time.bins:
                 seen_rings = unscattered + camera.impulses / max(count, 1)
                 times += camera.times + count * _scattered_times(setup, axes, maps.impulses, seen_rings)
-        tally = {"target": _pixels(picture, fine), "backscatter": backscatter}
+        tally = {"target": _pixels(picture, fine), "backscatter": veil.picture(backscatter)}
         return tally | {"time": times} if setup.time.bins else tally
 
     return Estimator("two-sided", batch, BATCH_SIZE, exact, ())
