@@ -6,11 +6,11 @@ from dataclasses import replace
 
 from imclab.errors import Fault, InputError
 from imclab.optics.surface import MICROFACET
-from imclab.transport import analog, two_sided
+from imclab.transport import analog, expected, two_sided
 from imclab.transport.runner import Estimator
 from imclab.transport.setup import Setup
 
-MAKERS = {"analog": analog.make, "two-sided": two_sided.make}
+MAKERS = {"analog": analog.make, "expected": expected.make, "two-sided": two_sided.make}
 
 
 def choose(name: str, setup: Setup) -> Estimator:
@@ -25,6 +25,12 @@ def choose(name: str, setup: Setup) -> Estimator:
 
 
 def _suitable(setup: Setup) -> tuple[str, str]:
-    if MICROFACET in (setup.target.figure.kind, setup.target.ground.kind):
-        return "analog", "a glossy surface sends light back in a narrow lobe"
-    return "two-sided", "both surfaces send light back with the same radiance everywhere"
+    kinds = {setup.target.figure.kind, setup.target.ground.kind}
+    if kinds == {MICROFACET}:
+        return "two-sided", "backscatter from the camera's side, light of the glossy target from the laser's"
+    if MICROFACET in kinds:
+        return (
+            "two-sided",
+            "a diffuse surface is lit and seen from both sides, the glossy one from the laser's",
+        )
+    return "two-sided", "a diffuse target is lit from the laser's side and seen from the camera's"

@@ -1,0 +1,68 @@
+"""Expected estimator: walks from the laser that score the chance of reaching the aperture.
+
+Works with every surface and every receiver. Light that no water scatters is not left to chance: from
+diffuse surfaces it is computed by quadrature, from glossy ones each pixel is sampled in turn.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from imclab.optics.surface import MICROFACET
+from imclab.transport.direct_light import coverage_of, direct_light, rules_for
+from imclab.transport.next_event import mirror_light, next_event_walks
+from imclab.transport.picture_grid import PictureGrid, picture_grid
+from imclab.transport.runner import Estimator, Tally
+from imclab.transport.setup import PULSE_REACH, Setup
+
+FloatArray = NDArray[np.float64]
+
+BATCH_SIZE = 20_000
+
+
+def make(setup: Setup) -> Estimator:
+    """Return the expected estimator of a set-up."""
+    grid = picture_grid(setup)
+    direct = direct_light(setup, rules_for(setup), coverage_of(setup.target.mask, *grid.cells))
+    exact = {"target": grid.pixels(direct.picture), "backscatter": np.zeros(grid.shape)}
+    if setup.time.bins:
+        exact["time"] = direct.times
+    latest = setup.gate.closes + PULSE_REACH * setup.gate.sigma
+    glossy = glossy_share(setup, grid)
+    scatters = setup.water.scattering > 0.0
+
+    def batch(seed: int, first_history: int, count: int) -> Tally:
+        pictures, times = np.zeros((2, *grid.shape)), np.zeros(setup.time.bins)
+        run = (np.uint64(seed), np.uint64(first_history), count)
+        if scatters:
+            next_event_walks(setup, False, latest, *run, pictures, times)
+        if glossy.any():
+            mirror_light(setup, glossy, *run, pictures[1], times)
+        tally = {"backscatter": pictures[0], "target": pictures[1]}
+        return tally | {"time": times} if setup.time.bins else tally
+
+    return Estimator("expected", batch, BATCH_SIZE, exact, left_out(setup))
+
+
+def glossy_share(setup: Setup, grid: PictureGrid) -> FloatArray:
+    """Return the share of glossy surface in each pixel."""
+    figure = coverage_of(setup.target.mask, *grid.shape)
+    shares = np.zeros(grid.shape)
+    if setup.target.figure.kind == MICROFACET:
+        shares += figure
+    if setup.target.ground.kind == MICROFACET:
+        shares += np.clip(1.0 - figure, 0.0, 1.0)
+    return shares
+
+
+def left_out(setup: Setup) -> tuple[str, ...]:
+    """Say what a scene spares the run."""
+    notes = ["light that no water scatters is computed for diffuse surfaces, not sampled"]
+    if setup.water.scattering == 0.0:
+        notes.append("no walks: the water does not scatter")
+    elif np.isfinite(setup.gate.closes):
+        notes.append("walks end when they can no longer arrive before the gate closes")
+    if not setup.time.bins:
+        notes.append("no time histogram: not asked for")
+    return tuple(notes)
