@@ -53,7 +53,7 @@ def make(setup: Setup) -> Estimator:
     table, peak, glossy = gate_table(setup, axes, direct), peak_angle(setup), glossy_share(setup, grid)
     unscattered = rings_seen(setup, axes, direct, coverage)
     scatters, shiny = setup.water.scattering > 0.0, bool(glossy.any())
-    diffuse = not {setup.target.figure.kind, setup.target.ground.kind} == {MICROFACET}
+    diffuse = {setup.target.figure.kind, setup.target.ground.kind} != {MICROFACET}
 
     def batch(seed: int, first_history: int, count: int) -> Tally:
         cells, backscatter = np.zeros_like(coverage), np.zeros(veil.shape)
