@@ -18,6 +18,7 @@ from imclab.commands.calibrate import calibrate
 from imclab.commands.gate import app as gate
 from imclab.commands.particles import particles
 from imclab.commands.simulate import simulate
+from imclab.commands.study import study
 from imclab.commands.sweep import sweep
 from imclab.commands.transmit import transmit
 from imclab.commands.twin import twin
@@ -52,6 +53,7 @@ app.command("transmit")(transmit)
 app.command("calibrate")(calibrate)
 app.command("particles")(particles)
 app.command("twin")(twin)
+app.command("study")(study)
 app.command("sweep")(sweep)
 app.add_typer(gate, name="gate")
 

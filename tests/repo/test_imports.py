@@ -40,6 +40,7 @@ FLOORS = {
     "imclab.twin": 7,
     "imclab.bench": 7,
     "imclab.sweep": 7,
+    "imclab.study": 8,
     "imclab.report": 8,
     "imclab.commands": 9,
     "imclab.cli": 10,
