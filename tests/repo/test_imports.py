@@ -22,6 +22,7 @@ FLOORS = {
     "imclab.materials": 2,
     "imclab.media": 2,
     "imclab.scene": 3,
+    "imclab.scene_reference": 4,
     "imclab.result": 4,
     "imclab.transport": 5,
     "imclab.detector": 5,
