@@ -74,7 +74,7 @@ class Agreement:
     area_probability : float
         Of a larger area when errors follow C.
     bound : float
-        The claim: \\|E\\| <= bound at every condition.
+        The claim: abs(E) <= bound at every condition.
     share_inside : float
         Share of conditions whose E lies inside the bound.
     probability_each : tuple of float
@@ -82,11 +82,11 @@ class Agreement:
     probability_all : float
         That all of them do, with their common errors taken into account.
     worst : str
-        The condition with the largest \\|E\\|.
+        The condition with the largest abs(E).
     worst_error : Estimate
         Its E.
     worst_bound_95 : float
-        The largest of all true \\|E\\| lies below this with 95 % probability.
+        The largest of all true abs(E) lies below this with 95 % probability.
     bland_altman : BlandAltman
     """
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,7 @@ EDGE_LENGTH, EDGE_BREADTH = 32, 17
 
 _OVERSAMPLING = (4, 2, 1)
 _RESAMPLES = 40
+_LEAST_REACH = 4.5  # pixels on both sides of an edge; fewer cut its line spread off
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,10 +93,9 @@ def profile(picture: FloatArray, stderr: FloatArray, region: BoolArray, *, axis:
     if axis == 1:
         picture, stderr, region = picture.T, stderr.T, region.T
     inside = region[band] & np.isfinite(picture[band])
-    count = inside.sum(axis=0)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        mean = np.where(inside, picture[band], 0.0).sum(axis=0) / count
-        spread = np.sqrt(np.where(inside, stderr[band], 0.0).__pow__(2).sum(axis=0)) / count
+    count = np.where(inside.any(axis=0), inside.sum(axis=0), np.nan)
+    mean = np.where(inside, picture[band], 0.0).sum(axis=0) / count
+    spread = np.sqrt(np.where(inside, stderr[band] ** 2, 0.0).sum(axis=0)) / count
     return Profile(position=np.arange(mean.size, dtype=np.float64), mean=mean, stderr=spread)
 
 
@@ -111,7 +112,8 @@ def find_edge(picture: FloatArray, region: BoolArray) -> tuple[slice, slice] | N
     """Find the window with the strongest single straight edge, in a picture of little noise.
 
     The measure is the length of the mean gradient over the mean length of the gradients: one for a
-    straight edge, near zero for the two sides of a bar.
+    straight edge, near zero for the two sides of a bar. The edge runs through the whole window, along
+    its middle.
 
     Parameters
     ----------
@@ -127,17 +129,17 @@ def find_edge(picture: FloatArray, region: BoolArray) -> tuple[slice, slice] | N
     smooth = gaussian_filter(np.where(region, np.nan_to_num(picture), 0.0), 1.0)
     down, right = np.gradient(smooth)
     length = np.hypot(down, right)
+    if not length.any():
+        return None
     best: tuple[float, tuple[slice, slice] | None] = (0.0, None)
     for size in ((EDGE_LENGTH, EDGE_BREADTH), (EDGE_BREADTH, EDGE_LENGTH)):
         if min(region.shape[0] - size[0], region.shape[1] - size[1]) < 0:
             continue
         fits = uniform_filter(region.astype(float), size, mode="constant") > 1 - 1e-9
-        mean = np.hypot(uniform_filter(down, size), uniform_filter(right, size))
-        straight = mean / np.maximum(uniform_filter(length, size), 1e-300)
-        across = uniform_filter(np.abs(right if size[0] > size[1] else down), size) > 0.7 * uniform_filter(
-            length, size
-        )
-        score = np.where(fits & across & (straight > 0.8), mean * straight**4, 0.0)
+        total = np.maximum(uniform_filter(length, size), 1e-6 * length.max())
+        straight = np.hypot(uniform_filter(down, size), uniform_filter(right, size)) / total
+        fits &= (straight > 0.8) & _runs_through(length, size, total)
+        score = np.where(fits, total * straight**5, 0.0)
         row, column = np.unravel_index(int(score.argmax()), score.shape)
         if score[row, column] > best[0]:
             top, left = int(row) - size[0] // 2, int(column) - size[1] // 2
@@ -146,7 +148,24 @@ def find_edge(picture: FloatArray, region: BoolArray) -> tuple[slice, slice] | N
     return best[1]
 
 
-def slanted_edge(patch: FloatArray, stderr: FloatArray | None = None, *, seed: int = 0) -> EdgeResponse | None:
+def _runs_through(length: FloatArray, size: tuple[int, int], total: FloatArray) -> BoolArray:
+    """Tell where gradients lie along the middle of the window, as much in either half of its length."""
+    along = 0 if size[0] > size[1] else 1
+    half, middle = list(size), list(size)
+    half[along] //= 2
+    middle[1 - along] = size[1 - along] // 2 + 1
+    share = middle[1 - along] / size[1 - along]
+    runs = uniform_filter(length, middle) * share > 0.9 * total
+    for side in (-1, 1):
+        origin = [0, 0]
+        origin[along] = side * (size[along] // 4)
+        runs &= uniform_filter(length, half, origin=origin) > 0.8 * total
+    return np.asarray(runs)
+
+
+def slanted_edge(
+    patch: FloatArray, stderr: FloatArray | None = None, *, seed: int = 0
+) -> EdgeResponse | None:
     """Measure the response of the edge that crosses ``patch``.
 
     Parameters
@@ -176,24 +195,30 @@ def slanted_edge(patch: FloatArray, stderr: FloatArray | None = None, *, seed: i
     step = next((1 / n for n in _OVERSAMPLING if _bins(patch.shape, line, 1 / n)[1].all()), None)
     if step is None:
         return None
-    distance, spread, frequency, mtf = _transfer(patch, line, step)
-    half = _half_frequency(frequency, mtf)
-    scatter, half_scatter = np.full(mtf.shape, np.nan), math.nan
+    found = _transfer(patch, line, step)
+    scatter, half_scatter = np.full(found.mtf.shape, np.nan), math.nan
     if stderr is not None:
         rng = np.random.default_rng(seed)
         draws = [patch + stderr * rng.standard_normal(patch.shape) for _ in range(_RESAMPLES)]
-        curves = np.array([_transfer(draw, line, step)[3] for draw in draws])
+        curves = np.array([_transfer(draw, line, step).mtf for draw in draws])
         scatter = curves.std(axis=0, ddof=1)
-        half_scatter = float(np.std([_half_frequency(frequency, curve) for curve in curves], ddof=1))
+        half_scatter = float(np.std([_half_frequency(found.frequency, curve) for curve in curves], ddof=1))
     return EdgeResponse(
         angle=abs(math.atan(line[1])),
-        distance=distance,
-        spread=spread,
-        frequency=frequency,
-        mtf=mtf,
+        distance=found.distance,
+        spread=found.spread,
+        frequency=found.frequency,
+        mtf=found.mtf,
         mtf_stderr=scatter,
-        mtf50=Estimate(half, half_scatter),
+        mtf50=Estimate(_half_frequency(found.frequency, found.mtf), half_scatter),
     )
+
+
+class _Transfer(NamedTuple):
+    distance: FloatArray
+    spread: FloatArray
+    frequency: FloatArray
+    mtf: FloatArray
 
 
 def _edge_line(patch: FloatArray) -> tuple[float, float] | None:
@@ -209,11 +234,13 @@ def _edge_line(patch: FloatArray) -> tuple[float, float] | None:
         if (total <= 0).any():
             return None
         tilt, middle = np.polyfit(rows, (weight * columns).sum(axis=1) / total, 1)
-    inside = 1.0 < middle < patch.shape[1] - 2.0
+    inside = _LEAST_REACH <= middle <= patch.shape[1] - 1 - _LEAST_REACH
     return (float(middle), float(tilt)) if inside else None
 
 
-def _bins(shape: tuple[int, ...], line: tuple[float, float], step: float) -> tuple[NDArray[np.int_], BoolArray]:
+def _bins(
+    shape: tuple[int, ...], line: tuple[float, float], step: float
+) -> tuple[NDArray[np.int_], BoolArray]:
     """Return the bin of every pixel by its distance across the edge, and which bins are filled."""
     rows = np.arange(shape[0]) - (shape[0] - 1) / 2
     away = (np.arange(shape[1]) - (line[0] + line[1] * rows)[:, None]) / math.hypot(1.0, line[1])
@@ -227,28 +254,31 @@ def _bins(shape: tuple[int, ...], line: tuple[float, float], step: float) -> tup
 def _reach(shape: tuple[int, ...], line: tuple[float, float]) -> float:
     """Whole pixels on both sides of the edge that at least half of the patch's rows cover."""
     room = min(line[0], shape[1] - 1 - line[0])
-    return float(max(math.floor(room / math.hypot(1.0, line[1])), 2))
+    return float(math.floor(room / math.hypot(1.0, line[1])))
 
 
-def _transfer(
-    patch: FloatArray, line: tuple[float, float], step: float
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return distance, edge spread, frequency and modulation transfer."""
+def _transfer(patch: FloatArray, line: tuple[float, float], step: float) -> _Transfer:
+    """Sample the edge in steps across it and transform its derivative."""
     index, filled = _bins(patch.shape, line, step)
-    sums = np.bincount(index.ravel(), patch.ravel(), minlength=filled.size + 1)[: filled.size]
-    counts = np.bincount(index.ravel(), minlength=filled.size + 1)[: filled.size]
-    spread = sums / np.maximum(counts, 1)
-    distance = (np.arange(spread.size) - spread.size // 2) * step
-    slope = np.diff(spread) * tukey(spread.size - 1, 0.5)
+    size = filled.size
+    sums = np.bincount(index.ravel(), patch.ravel(), minlength=size + 1)[:size]
+    counts = np.bincount(index.ravel(), minlength=size + 1)[:size]
+    spread = np.asarray(sums / np.maximum(counts, 1), dtype=np.float64)
+    slope = np.diff(spread) * tukey(size - 1, 0.5)
     padded = 8 * slope.size
     frequency = np.fft.rfftfreq(padded, step)
-    kept = frequency <= 1.0
     transfer = np.abs(np.fft.rfft(slope, padded))
     # The bins average over one step and the difference spans one: both lower the transfer by sinc.
     mtf = transfer / transfer[0] / np.sinc(frequency * step) ** 2
-    edge = max(1, round(1.0 / step))
-    dark, bright = spread[:edge].mean(), spread[-edge:].mean()
-    return distance, (spread - dark) / (bright - dark), frequency[kept], mtf[kept]
+    end = max(1, round(1.0 / step))
+    dark, bright = spread[:end].mean(), spread[-end:].mean()
+    kept = frequency <= 1.0
+    return _Transfer(
+        distance=np.asarray((np.arange(size) - size // 2) * step),
+        spread=np.asarray((spread - dark) / (bright - dark)),
+        frequency=np.asarray(frequency[kept]),
+        mtf=np.asarray(mtf[kept]),
+    )
 
 
 def _half_frequency(frequency: FloatArray, mtf: FloatArray) -> float:
@@ -258,4 +288,6 @@ def _half_frequency(frequency: FloatArray, mtf: FloatArray) -> float:
         return math.nan
     after = int(below[0])
     high, low = mtf[after - 1], mtf[after]
-    return float(frequency[after - 1] + (high - 0.5) / (high - low) * (frequency[after] - frequency[after - 1]))
+    return float(
+        frequency[after - 1] + (high - 0.5) / (high - low) * (frequency[after] - frequency[after - 1])
+    )

@@ -6,7 +6,7 @@ figure may mean anything by being light or dark.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import matplotlib
@@ -14,11 +14,13 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
-from matplotlib.ticker import LogFormatter, StrMethodFormatter
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 from numpy.typing import NDArray
 
 from imclab.agreement import Agreement, judged
 from imclab.comparison import Comparison, Outcome
+from imclab.registration import Registration
+from imclab.registration.motion import displacements, moved
 from imclab.report.context import Context
 from imclab.report.detail import Detail
 from imclab.report.pictures import brightest, reduced
@@ -26,7 +28,8 @@ from imclab.uncertainty import COVERAGE_95
 
 MEASURED, SIMULATED, BOUND, ACCENT = "#111111", "#1667a8", "#b4541a", "#7a7a7a"
 _MARKERS = "osD^vP"
-_STYLE: Mapping[str, Any] = {
+_CHI_SQUARE_95 = 5.991  # of two degrees of freedom
+_STYLE: dict[Any, Any] = {
     "font.family": "DejaVu Sans",
     "font.size": 8.5,
     "axes.spines.top": False,
@@ -84,14 +87,16 @@ def _drawn(figure: Figure, *, dpi: int = 180) -> NDArray[np.uint8]:
     return np.asarray(canvas.buffer_rgba())[..., :3].copy()
 
 
-def _figure(width: float, height: float, rows: int = 1, columns: int = 1, **options: Any) -> tuple[Figure, Any]:
+def _figure(
+    width: float, height: float, rows: int = 1, columns: int = 1, **options: Any
+) -> tuple[Figure, Any]:
     figure = Figure(figsize=(width, height), layout="constrained", facecolor="white")
     return figure, figure.subplots(rows, columns, squeeze=False, **options)
 
 
 def energy_curve(comparison: Comparison) -> Figure:
     """Energy ratio against optical depth, and the relative error below with the bound."""
-    figure, axes = _figure(6.4, 5.0, 2, 1, sharex=True, height_ratios=(3, 2))
+    figure, axes = _figure(5.2, 4.8, 2, 1, sharex=True, height_ratios=(3, 2))
     upper, lower = axes[:, 0]
     for index, (reference, group) in enumerate(_groups(comparison).items()):
         depth = np.array([outcome.pair.optical_depth for outcome in group])
@@ -115,20 +120,31 @@ def energy_curve(comparison: Comparison) -> Figure:
             label=f"relative to {reference}",
         )
     upper.set_yscale("log")
-    upper.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
-    upper.yaxis.set_minor_formatter(LogFormatter(minor_thresholds=(2, 0.7)))
+    _plain_numbers(upper.yaxis)
     upper.set_ylabel("energy over that of the reference")
-    upper.legend(ncols=2, loc="upper right")
+    upper.legend(loc="lower left")
     bound = 100 * max((outcome.error.bound for outcome in comparison.outcomes), default=0.3)
     lower.axhline(0, color=MEASURED, linewidth=0.8)
     for side in (-bound, bound):
         lower.axhline(side, color=BOUND, linewidth=1.0, linestyle=(0, (5, 3)))
     lower.annotate(
-        f"±{bound:.0f} %", (1.0, bound), xycoords=("axes fraction", "data"), ha="right", va="bottom", color=BOUND
+        f"±{bound:.0f} %",
+        (1.0, bound),
+        xycoords=("axes fraction", "data"),
+        ha="right",
+        va="bottom",
+        color=BOUND,
     )
     lower.set_ylabel("simulated/measured − 1 / %")
     lower.set_xlabel("optical depth (attenuation × distance, one way)")
     return figure
+
+
+def _plain_numbers(axis: Any) -> None:
+    """Write 0.2 rather than 2 × 10⁻¹ on a logarithmic axis."""
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def _points(axes: Any, x: NDArray[np.float64], estimates: Sequence[Any], **style: Any) -> None:
@@ -152,12 +168,16 @@ def _groups(comparison: Comparison) -> dict[str, list[Outcome]]:
 
 def bland_altman(comparison: Comparison, agreement: Agreement) -> Figure:
     """Difference against mean of the energy ratios, with bias and limits of agreement."""
-    figure, axes = _figure(6.4, 3.0)
+    figure, axes = _figure(5.2, 3.0)
     plot, altman = axes[0, 0], agreement.bland_altman
+    references = list(_groups(comparison))
     for outcome, mean, difference in zip(judged(comparison), altman.mean, altman.difference, strict=True):
-        plot.plot(mean, 100 * difference, "o", color=SIMULATED, markersize=5.5)
-        label = f"{outcome.pair.name} (gain {outcome.pair.gain:g})"
-        plot.annotate(label, (mean, 100 * difference), (5, 4), textcoords="offset points", fontsize=7)
+        group = references.index(outcome.reference)
+        marker = _MARKERS[group % len(_MARKERS)]
+        plot.plot(mean, 100 * difference, marker, color=SIMULATED, markersize=5.5)
+        place = (6, 4 if group % 2 == 0 else -11)
+        text = f"gain {outcome.pair.gain:g}"
+        plot.annotate(text, (mean, 100 * difference), place, textcoords="offset points", fontsize=7)
     for level, name, style in (
         (altman.bias.value, "bias", "-"),
         (altman.lower, "limits of agreement", (0, (5, 3))),
@@ -166,9 +186,15 @@ def bland_altman(comparison: Comparison, agreement: Agreement) -> Figure:
         if np.isfinite(level):
             plot.axhline(100 * level, color=BOUND, linewidth=1.0, linestyle=style)
             plot.annotate(
-                name, (1.0, 100 * level), xycoords=("axes fraction", "data"), ha="right", va="bottom", color=BOUND
+                name,
+                (1.0, 100 * level),
+                xycoords=("axes fraction", "data"),
+                ha="right",
+                va="bottom",
+                color=BOUND,
             )
     plot.set_xscale("log")
+    _plain_numbers(plot.xaxis)
     plot.margins(x=0.25, y=0.2)
     plot.set_xlabel("mean of simulated and measured energy ratio")
     plot.set_ylabel("difference over mean / %")
@@ -197,7 +223,9 @@ def sharpness(outcome: Outcome, seen: Detail) -> Figure:
     plot = axes[0, 2]
     plot.set_title("slanted edge")
     if seen.edge is None:
-        plot.text(0.5, 0.5, "no straight slanted edge found", ha="center", va="center", transform=plot.transAxes)
+        plot.text(
+            0.5, 0.5, "no straight slanted edge found", ha="center", va="center", transform=plot.transAxes
+        )
     else:
         for edge, colour in zip(seen.edge, (MEASURED, SIMULATED), strict=True):
             low, high = (edge.mtf + sign * COVERAGE_95 * edge.mtf_stderr for sign in (-1, 1))
@@ -255,17 +283,13 @@ def registration_overlays(comparison: Comparison, *, magnified: float = 50.0) ->
         pair = outcome.pair
         top = brightest(pair)
         plot.set_facecolor("#4a6282")
-        plot.imshow(np.ma.masked_invalid(pair.measured / top), cmap="gray", vmin=0, vmax=1.15, interpolation="nearest")
+        plot.imshow(
+            np.ma.masked_invalid(pair.measured / top), cmap="gray", vmin=0, vmax=1.15, interpolation="nearest"
+        )
         level = float(np.nanquantile(pair.simulated[pair.region], [0.1, 0.97]).mean())
         plot.contour(pair.simulated, levels=[level], colors=["#ff7f2a"], linewidths=0.8)
-        rows, columns = pair.result.energy.shape
-        corners = np.array([[0, 0], [columns - 1, 0], [columns - 1, rows - 1], [0, rows - 1]], dtype=float)
-        placed = np.c_[corners, np.ones(4)] @ np.asarray(pair.registration.matrix).T
-        placed = placed[:, :2] / placed[:, 2:]
-        plot.plot(*placed[[0, 1, 2, 3, 0]].T, color="#39a0ff", linewidth=0.8)
-        for corner in placed:
-            size = 2 * magnified * COVERAGE_95 * outcome.pair.registration.corner_stderr_px
-            plot.add_patch(Ellipse(tuple(corner), size, size, fill=False, color="#39a0ff", linewidth=0.9))
+        if np.isfinite(pair.registration.matrix).all():
+            _frame_with_ellipses(plot, pair.registration, magnified)
         plot.set_title(pair.name if pair.registration.ok else f"{pair.name}: not registered")
         plot.grid(visible=False)
         plot.set_xticks([])
@@ -273,6 +297,22 @@ def registration_overlays(comparison: Comparison, *, magnified: float = 50.0) ->
         plot.set_xlim(-0.5, pair.measured.shape[1] - 0.5)
         plot.set_ylim(pair.measured.shape[0] - 0.5, -0.5)
     return figure
+
+
+def _frame_with_ellipses(plot: Any, found: Registration, magnified: float) -> None:
+    """Draw the border of the simulated picture where it lies, and the 95 % region of each corner."""
+    rows, columns = found.fixed_shape
+    corners = np.array([[0, 0], [columns - 1, 0], [columns - 1, rows - 1], [0, rows - 1]], dtype=float)
+    placed = moved(found.matrix, corners)
+    plot.plot(*placed[[0, 1, 2, 3, 0]].T, color="#39a0ff", linewidth=0.8)
+    slopes = displacements(found.matrix, corners, found.frame, len(found.covariance))
+    for corner, slope in zip(placed, slopes, strict=True):
+        values, vectors = np.linalg.eigh(slope @ found.covariance @ slope.T)
+        small, large = 2 * magnified * np.sqrt(_CHI_SQUARE_95 * np.maximum(values, 0.0))
+        angle = np.degrees(np.arctan2(vectors[1, 1], vectors[0, 1]))
+        plot.add_patch(
+            Ellipse(tuple(corner), large, small, angle=angle, fill=False, color="#39a0ff", linewidth=0.9)
+        )
 
 
 def pixel_distributions(comparison: Comparison) -> Figure:
@@ -304,7 +344,13 @@ def calibration(context: Context) -> Figure | None:
     figure, axes = _figure(7.2, 2.8, 1, len(curves))
     for plot, curve in zip(axes[0], curves, strict=True):
         plot.errorbar(
-            curve.x, curve.y, COVERAGE_95 * curve.stderr, fmt="o-", color=MEASURED, markersize=3, linewidth=0.9
+            curve.x,
+            curve.y,
+            COVERAGE_95 * curve.stderr,
+            fmt="o-",
+            color=MEASURED,
+            markersize=3,
+            linewidth=0.9,
         )
         plot.set_xlabel(curve.x_label)
         plot.set_ylabel(curve.y_label)

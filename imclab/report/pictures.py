@@ -72,7 +72,7 @@ def brightest(pair: Pair) -> float:
 
 
 def coloured(picture: FloatArray, scale: Scale, *, comment: str = "") -> bytes:
-    """Return ``picture`` as PNG with a colour table; NaN is the scale's missing colour. Same bytes from the same input."""
+    """Return ``picture`` as PNG with a colour table; the same bytes from the same picture."""
     from PIL import Image, PngImagePlugin
 
     share = (picture - scale.low) / (scale.high - scale.low)
@@ -88,7 +88,7 @@ def coloured(picture: FloatArray, scale: Scale, *, comment: str = "") -> bytes:
 def gradient(colours: str) -> str:
     """Return a scale as a CSS gradient from left to right."""
     stops = _table(colours)[:: (LEVELS - 1) // 10]
-    return f"linear-gradient(90deg,{','.join('#%02x%02x%02x' % tuple(stop) for stop in stops)})"
+    return f"linear-gradient(90deg,{','.join(f'#{bytes(stop).hex()}' for stop in stops)})"
 
 
 def reduced(image_rgb: NDArray[np.uint8], *, comment: str, colours: int = 128) -> bytes:

@@ -98,7 +98,7 @@ def _plain(key: str) -> str:
 def _read(member: Any, wanted: Any) -> Any:
     """Return what ``member`` holds, a dataset or a group, as type ``wanted``."""
     if hasattr(member, "shape"):
-        return _read_dataset(member)
+        return _read_dataset(member, wanted)
     if typing.get_origin(wanted) in (typing.Union, types.UnionType):
         wanted = next(kind for kind in typing.get_args(wanted) if kind is not types.NoneType)
     if is_dataclass(wanted):
@@ -112,10 +112,12 @@ def _read(member: Any, wanted: Any) -> Any:
     return {_plain(name): _read(member[name], kinds[-1]) for name in member}
 
 
-def _read_dataset(dataset: Any) -> Any:
+def _read_dataset(dataset: Any, wanted: Any) -> Any:
     if dataset.dtype.kind == "O":
         value = json.loads(dataset.asstr()[()])
-        return tuple(value) if isinstance(value, list) else value
+        if not isinstance(value, list):
+            return value
+        return wanted(*value) if hasattr(wanted, "_fields") else tuple(value)
     array = dataset[()]
     array.setflags(write=False)
     return array

@@ -86,9 +86,7 @@ class Tab:
             deviceScaleFactor=2 if phone else 1,
             mobile=phone,
         )
-        self.ask(
-            "Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}]
-        )
+        self.ask("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
         self.events.clear()
         self.ask("Page.navigate", url=page.resolve().as_uri())
         self.wait_for("Page.loadEventFired")
@@ -102,9 +100,7 @@ class Tab:
     def press(self, key: str, code: int) -> None:
         """Press and release a key in whatever has the focus."""
         for kind in ("rawKeyDown", "keyUp"):
-            self.ask(
-                "Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=code
-            )
+            self.ask("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=code)
 
     def screenshot(self, file: Path, *, whole: bool = False) -> None:
         """Save what is seen, or the whole page, as PNG."""
@@ -113,7 +109,9 @@ class Tab:
 
     def requests(self) -> list[str]:
         """Addresses that the page asked for since it was opened, those inside the page left out."""
-        sent = (e["params"]["request"]["url"] for e in self.events if e["method"] == "Network.requestWillBeSent")
+        sent = (
+            e["params"]["request"]["url"] for e in self.events if e["method"] == "Network.requestWillBeSent"
+        )
         return [url for url in sent if not url.startswith("data:")]
 
     def complaints(self) -> list[str]:

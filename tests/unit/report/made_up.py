@@ -14,6 +14,7 @@ from scipy.ndimage import gaussian_filter
 
 from imclab.comparison import Comparison, Outcome, Pair
 from imclab.registration import Registration
+from imclab.registration.motion import Frame
 from imclab.report.context import Context, Curve, Entry
 from imclab.result import Result
 from imclab.uncertainty import ComparisonError, Estimate, budget, covariance
@@ -170,18 +171,23 @@ def _result(energy: NDArray[np.float64], depth: float, seed: int) -> Result:
 def _registration(size: int) -> Registration:
     turn, scale = math.radians(1.7), 0.83
     matrix = np.eye(3)
-    matrix[:2, :2] = scale * np.array(
-        [[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]]
-    )
+    matrix[:2, :2] = scale * np.array([[math.cos(turn), -math.sin(turn)], [math.sin(turn), math.cos(turn)]])
     matrix[:2, 2] = 0.1 * size
     return Registration(
         matrix=matrix,
-        stderr_px=0.05,
-        target_stderr_px=0.03,
-        corner_stderr_px=0.09,
+        model="similarity",
         ok=True,
         reason="",
         quality=0.97,
+        contrast=140.0,
+        covariance=np.diag([1e-3, 8e-4, 6e-4, 9e-4]) ** 2,
+        stderr_px=0.071,
+        corner_stderr_px=np.array([0.07, 0.06, 0.08, 0.07]),
+        target_stderr_px=0.03,
+        blur_px=0.9,
+        fixed_shape=(size, size),
+        moving_shape=(size, size),
+        frame=Frame(size / 2, size / 2, size / 3),
     )
 
 
