@@ -22,7 +22,7 @@ from imclab.uncertainty import Estimate
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-EDGE_LENGTH, EDGE_BREADTH = 32, 17
+EDGE_LENGTH, EDGE_BREADTH = 33, 17
 """Pixels along and across the edge that `find_edge` looks for."""
 
 _OVERSAMPLING = (4, 2, 1)
@@ -152,7 +152,7 @@ def _runs_through(length: FloatArray, size: tuple[int, int], total: FloatArray) 
     """Tell where gradients lie along the middle of the window, as much in either half of its length."""
     along = 0 if size[0] > size[1] else 1
     half, middle = list(size), list(size)
-    half[along] //= 2
+    half[along] = size[along] // 2 + 1
     middle[1 - along] = size[1 - along] // 2 + 1
     share = middle[1 - along] / size[1 - along]
     runs = uniform_filter(length, middle) * share > 0.9 * total

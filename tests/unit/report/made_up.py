@@ -113,8 +113,9 @@ def _pair(name: str, depth: float, size: int, *, seed: int) -> Pair:
     simulated = clean * (1 + 0.004 * rng.standard_normal(clean.shape))
     region = np.zeros(clean.shape, dtype=bool)
     region[3:-3, 3:-3] = True
-    region[30, 40] = region[61, 22] = False
-    measured[30, 40] = measured[61, 22] = np.nan
+    for row, column in ((size // 3, size // 2), (2 * size // 3, size // 4)):
+        region[row, column] = False
+        measured[row, column] = np.nan
     counts = 1800.0 / level
     return Pair(
         name=name,
