@@ -221,7 +221,8 @@ def pixel_area(pair: Pair) -> float:
     of the region (V&V 10.1): blind to where the light falls, so registration does not enter.
     """
     measured, simulated = pair.measured[pair.region], pair.simulated[pair.region]
-    return float(stats.wasserstein_distance(simulated, measured) / np.abs(measured.mean()))
+    level = float(np.abs(measured.mean())) if measured.size else 0.0
+    return float(stats.wasserstein_distance(simulated, measured) / level) if level else math.nan
 
 
 def bland_altman(simulated: ArrayLike, measured: ArrayLike) -> BlandAltman:

@@ -45,9 +45,8 @@ def document(
             for outcome, seen in zip(comparison.outcomes, details, strict=True)
         ],
         "covariance": {
-            "unit": "1",
             "conditions": [outcome.pair.name for outcome in comparison.outcomes],
-            "values": comparison.covariance.tolist(),
+            **_array(comparison.covariance, "1"),
         },
         "calibration": [_entry(entry) for entry in context.calibration],
         "modelled": list(context.modelled),
@@ -78,7 +77,11 @@ def _estimate(estimate: Estimate, unit: str = "1") -> Document:
 
 
 def _array(values: Any, unit: str) -> Document:
-    return {"unit": unit, "values": [_finite(value) for value in np.asarray(values, dtype=float)]}
+    return {"unit": unit, "values": _nested(np.asarray(values, dtype=float).tolist())}
+
+
+def _nested(values: Any) -> Any:
+    return [_nested(value) for value in values] if isinstance(values, list) else _finite(values)
 
 
 def _entry(entry: Entry) -> Document:
@@ -221,7 +224,7 @@ def _registration(outcome: Outcome) -> Document:
         "quality": quantity(found.quality, "1"),
         "stderr": quantity(found.stderr_px, "px"),
         "target_stderr": quantity(found.target_stderr_px, "px"),
-        "matrix": {"unit": "px", "values": np.asarray(found.matrix, dtype=float).tolist()},
+        "matrix": _array(found.matrix, "px"),
     }
 
 
