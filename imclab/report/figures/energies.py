@@ -1,0 +1,123 @@
+"""Figures of the energy curve: ratios, relative errors, difference against mean."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
+from numpy.typing import NDArray
+
+from imclab.agreement import Agreement, judged
+from imclab.comparison import Comparison, Outcome
+from imclab.report.figures.style import BOUND, MARKERS, MEASURED, SIMULATED, new_figure
+from imclab.uncertainty import COVERAGE_95
+
+
+def energy_curve(comparison: Comparison) -> Figure:
+    """Energy ratio against optical depth, and the relative error below with the bound."""
+    figure, axes = new_figure(5.2, 4.8, 2, 1, sharex=True, height_ratios=(3, 2))
+    upper, lower = axes[:, 0]
+    for index, (reference, group) in enumerate(_groups(comparison).items()):
+        depth = np.array([outcome.pair.optical_depth for outcome in group])
+        marker = MARKERS[index % len(MARKERS)]
+        shift = 0.012 * (index - (len(_groups(comparison)) - 1) / 2)
+        for which, colour, offset, fill in (
+            ("measured_ratio", MEASURED, -0.003, "white"),
+            ("simulated_ratio", SIMULATED, 0.003, SIMULATED),
+        ):
+            ratio = [getattr(outcome, which) for outcome in group]
+            label = f"{which.split('_')[0]}, {reference}"
+            _points(upper, depth + shift + offset, ratio, color=colour, marker=marker, mfc=fill, label=label)
+        lower.errorbar(
+            depth + shift,
+            [100 * outcome.error.value for outcome in group],
+            [100 * COVERAGE_95 * outcome.error.u_val for outcome in group],
+            fmt=marker,
+            color=SIMULATED,
+            markersize=5,
+            elinewidth=1.1,
+            label=f"relative to {reference}",
+        )
+    upper.set_yscale("log")
+    _plain_numbers(upper.yaxis)
+    upper.set_ylabel("energy over that of the reference")
+    upper.legend(loc="lower left")
+    bound = 100 * max((outcome.error.bound for outcome in comparison.outcomes), default=0.3)
+    lower.axhline(0, color=MEASURED, linewidth=0.8)
+    for side in (-bound, bound):
+        lower.axhline(side, color=BOUND, linewidth=1.0, linestyle=(0, (5, 3)))
+    lower.annotate(
+        f"±{bound:.0f} %",
+        (1.0, bound),
+        xycoords=("axes fraction", "data"),
+        ha="right",
+        va="bottom",
+        color=BOUND,
+    )
+    lower.set_ylabel("simulated/measured − 1 / %")
+    lower.set_xlabel("optical depth (attenuation × distance, one way)")
+    return figure
+
+
+def bland_altman(comparison: Comparison, agreement: Agreement) -> Figure:
+    """Difference against mean of the energy ratios, with bias and limits of agreement."""
+    figure, axes = new_figure(5.2, 3.0)
+    plot, altman = axes[0, 0], agreement.bland_altman
+    references = list(_groups(comparison))
+    for outcome, mean, difference in zip(judged(comparison), altman.mean, altman.difference, strict=True):
+        group = references.index(outcome.reference)
+        marker = MARKERS[group % len(MARKERS)]
+        plot.plot(mean, 100 * difference, marker, color=SIMULATED, markersize=5.5)
+        place = (6, 4 if group % 2 == 0 else -11)
+        text = f"gain {outcome.pair.gain:g}"
+        plot.annotate(text, (mean, 100 * difference), place, textcoords="offset points", fontsize=7)
+    for level, name, style in (
+        (altman.bias.value, "bias", "-"),
+        (altman.lower, "limits of agreement", (0, (5, 3))),
+        (altman.upper, "", (0, (5, 3))),
+    ):
+        if np.isfinite(level):
+            plot.axhline(100 * level, color=BOUND, linewidth=1.0, linestyle=style)
+            plot.annotate(
+                name,
+                (1.0, 100 * level),
+                xycoords=("axes fraction", "data"),
+                ha="right",
+                va="bottom",
+                color=BOUND,
+            )
+    plot.set_xscale("log")
+    _plain_numbers(plot.xaxis)
+    plot.margins(x=0.25, y=0.2)
+    plot.set_xlabel("mean of simulated and measured energy ratio")
+    plot.set_ylabel("difference over mean / %")
+    return figure
+
+
+def _plain_numbers(axis: Any) -> None:
+    """Write 0.2 rather than 2 × 10⁻¹ on a logarithmic axis."""
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def _points(axes: Any, x: NDArray[np.float64], estimates: Sequence[Any], **style: Any) -> None:
+    axes.errorbar(
+        x,
+        [estimate.value for estimate in estimates],
+        [COVERAGE_95 * estimate.stderr for estimate in estimates],
+        linestyle="none",
+        markersize=5.5,
+        elinewidth=1.1,
+        **style,
+    )
+
+
+def _groups(comparison: Comparison) -> dict[str, list[Outcome]]:
+    groups: dict[str, list[Outcome]] = {}
+    for outcome in comparison.outcomes:
+        groups.setdefault(outcome.reference, []).append(outcome)
+    return groups
