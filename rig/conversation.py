@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import re
 import threading
-import time
 from collections.abc import Iterator, Sequence
 
 from rig.dialect import Dialect, Identity, Line
@@ -168,12 +167,12 @@ class Conversation:
 
     def _identify(self) -> Identity:
         """Wait for silence, then take nothing for an answer but the box's identity."""
-        give_up = time.monotonic() + _RESYNCHRONISE_S
+        give_up = self.link.now() + _RESYNCHRONISE_S
         others: list[str] = []
-        while time.monotonic() < give_up and len(others) < _ATTEMPTS:
+        while self.link.now() < give_up and len(others) < _ATTEMPTS:
             self._hear_silence(give_up)
             self._send(self.dialect.terminator + "*IDN?" + self.dialect.terminator, "who are you")
-            deadline = time.monotonic() + self._timeout_s + 80 * self._byte_s
+            deadline = self.link.now() + self._timeout_s + 80 * self._byte_s
             while raw := self.link.read_line(deadline):
                 self.journal.write_received(raw)
                 text = raw.decode("latin-1").removesuffix("\r\n")
@@ -214,7 +213,7 @@ class Conversation:
         text = "".join(line.text + end for line in lines)
         self._send(text, meaning)
         asked = [line for line in lines if line.reply is not None]
-        deadline = time.monotonic() + self._timeout_s + self._byte_s * (len(text) + 64 * len(asked))
+        deadline = self.link.now() + self._timeout_s + self._byte_s * (len(text) + 64 * len(asked))
         replies = []
         echoes = {line.text for line in lines}
         for line in asked:

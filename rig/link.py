@@ -25,6 +25,9 @@ class Link(Protocol):
 
     name: str
 
+    def now(self) -> float:
+        """Return the time that deadlines are in, in seconds."""
+
     def open(self) -> None:
         """Open the port; nothing is sent."""
 
@@ -85,6 +88,10 @@ class SerialLink:
             self._port = serial.serial_for_url(
                 self.name, baudrate=self.baud, timeout=_SLICE_S, write_timeout=_WRITE_TIMEOUT_S
             )
+
+    def now(self) -> float:
+        """Return the monotonic time."""
+        return time.monotonic()
 
     def close(self) -> None:
         """Close the port; never raises, safe to call twice."""

@@ -145,9 +145,9 @@ class Faults:
     def run(self, line: str) -> list[Chunk]:
         """Pass one command through all faults to the device and return what goes out."""
         for name in COMMAND_FAULTS:
-            if self._strikes(name):
+            if line.strip() and self._strikes(name):
                 line = self._spoil_command(name, line)
-        if not line.strip("\r\n "):
+        if not line.strip():
             return []
         is_set = "?" not in line
         reply = self._feed(line, is_set)
