@@ -20,6 +20,7 @@ from rig.quantity import Quantity
 _EDGES = ("T0", "T1", "A", "B", "C", "D", "E", "F", "G", "H")
 _OUTPUTS = {"T0": 0, "AB": 1, "CD": 2, "EF": 3, "GH": 4}
 _TIME = Steps("time", "ps", 10**12, 5, 0, 1_999_999_999_999_995)
+_WIDTH = Steps("time", "ps", 10**12, 5, MODELS["dg645"].shortest_width_ps, _TIME.highest)
 _DELAY_REPLY = re.compile(r"([0-9]),([+-]\d{1,4}\.\d{12})")
 _NUMBER_REPLY = re.compile(r"[+-]?\d+(?:\.\d+)?(?:[eE][+-]?\d+)?")
 _DIGIT_REPLY = re.compile(r"\d")
@@ -36,13 +37,14 @@ class _EdgeTime(NamedTuple):
 class _EdgeTimes:
     """Times after one reference; ``only`` that one has a number (a width is fall minus rise)."""
 
+    steps: Steps
     reference: str
     only: bool
     unit: str = "ps"
 
     def native(self, value: Quantity, where: str) -> _EdgeTime:
         """Return the nearest step after the reference."""
-        return _EdgeTime(self.reference, _TIME.native(value, where))
+        return _EdgeTime(self.reference, self.steps.native(value, where))
 
     def shown(self, native: _EdgeTime) -> int | None:
         """Return picoseconds after the edge it hangs on; None for a width that is no number of its own."""
@@ -230,7 +232,8 @@ def _named(name: str, output: str | None, names: Names, mnemonic: str, index: st
 
 def _edge_time(name: str, output: str, edge: int, reference: int) -> Property:
     """Return the time of an edge after its reference: T0 for the rise, the rise for the fall."""
-    times = _EdgeTimes(_EDGES[reference], only=name == "width")
+    is_width = name == "width"
+    times = _EdgeTimes(_WIDTH if is_width else _TIME, _EDGES[reference], only=is_width)
 
     def parse(replies: Sequence[str]) -> _EdgeTime:
         matched = _DELAY_REPLY.fullmatch(replies[0])

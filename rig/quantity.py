@@ -39,7 +39,7 @@ _UNITS: dict[str, dict[str, Fraction]] = {
                          "ps/mm": Fraction("1e-9")},
     "number": {"": Fraction(1)},
 }  # fmt: skip
-_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(\S*)\s*")
+_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,2})?)\s*(\S*)\s*")
 _EXAMPLE = {
     "time": "85 ns",
     "length": "1.5 m",

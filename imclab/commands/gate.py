@@ -209,6 +209,7 @@ def simulate(
     server = rig.simulate(
         model, tcp=address, pty=wants_pty, baud=baud, seed=seed, serial=serial, symlink=link
     )
+    server.open()
     for one in fault or []:
         told = json.loads(answer(server, f"fault {one}"))
         if "error" in told:

@@ -22,7 +22,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from rig.errors import Fault, PlanError
+from rig.errors import Fault, LinkError, PlanError
 from rig.simulator.faults import Chunk, Device, Faults
 from rig.simulator.lines import CommandSplitter
 from rig.simulator.side_door import answer
@@ -80,13 +80,12 @@ class SimulatorServer:
         self._pty: tuple[int, int] | None = None
         self._thread: threading.Thread | None = None
         self._stopping = False
-        self._wake, waker = socket.socketpair()
-        self._waker = waker
-        self._selector.register(self._wake, selectors.EVENT_READ, lambda: self._wake.recv(64))
-        self._listener = None if tcp is None else self._listen(_address(tcp), self._accept)
-        self._door = self._listen(("127.0.0.1", 0), self._accept_at_side_door)
-        if pty:
-            self._open_pty()
+        self._tcp = None if tcp is None else _address(tcp)
+        self._wants_pty = pty
+        self._listener: socket.socket | None = None
+        self._door: socket.socket | None = None
+        self._wake: socket.socket | None = None
+        self._waker: socket.socket | None = None
 
     @property
     def address(self) -> tuple[str, int] | None:
@@ -103,10 +102,34 @@ class SimulatorServer:
     @property
     def side_door(self) -> tuple[str, int]:
         """Host and port of the side door."""
+        if self._door is None:
+            raise LinkError("simulated generator: not open; wanted open() or a with block")
         host, port = self._door.getsockname()[:2]
         return host, port
 
+    def open(self) -> None:
+        """Take the ports.
+
+        Raises
+        ------
+        PlanError
+            If a port is taken.
+        """
+        wake, self._waker = socket.socketpair()
+        self._wake = wake
+        self._selector.register(wake, selectors.EVENT_READ, lambda: wake.recv(64))
+        try:
+            if self._tcp is not None:
+                self._listener = self._listen(self._tcp, self._accept)
+            self._door = self._listen(("127.0.0.1", 0), self._accept_at_side_door)
+            if self._wants_pty:
+                self._open_pty()
+        except BaseException:
+            self.close()
+            raise
+
     def __enter__(self) -> Self:
+        self.open()
         self._thread = threading.Thread(target=self.run, name="simulated generator", daemon=True)
         self._thread.start()
         return self
@@ -131,8 +154,9 @@ class SimulatorServer:
     def stop(self) -> None:
         """End ``run``; from any thread."""
         self._stopping = True
-        with contextlib.suppress(OSError):
-            self._waker.send(b"x")
+        if self._waker is not None:
+            with contextlib.suppress(OSError):
+                self._waker.send(b"x")
 
     def close(self) -> None:
         """Close every port; the pty's symlink goes with it."""
