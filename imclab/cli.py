@@ -17,6 +17,7 @@ import imclab
 from imclab.commands.calibrate import calibrate
 from imclab.commands.gate import app as gate
 from imclab.commands.particles import particles
+from imclab.commands.report import report
 from imclab.commands.simulate import simulate
 from imclab.commands.study import study
 from imclab.commands.sweep import sweep
@@ -52,6 +53,7 @@ app.command("simulate")(simulate)
 app.command("transmit")(transmit)
 app.command("calibrate")(calibrate)
 app.command("particles")(particles)
+app.command("report")(report)
 app.command("twin")(twin)
 app.command("study")(study)
 app.command("sweep")(sweep)
