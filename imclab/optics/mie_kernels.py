@@ -177,10 +177,7 @@ def _sum_coefficients(x: float, a: ComplexArray, b: ComplexArray) -> tuple[float
 
 
 @_kernel
-def efficiencies_of_one(x: float, m: Any) -> tuple[float, float, float, float, float]:
-    """Return Q_ext, Q_sca, Q_abs, Q_back and g of one sphere; ``m`` a float or n - ik with k >= 0."""
-    if m == 1.0:
-        return 0.0, 0.0, 0.0, 0.0, 0.0
+def _efficiencies(x: float, m: Any) -> tuple[float, float, float, float, float]:
     terms = number_of_terms(x)
     a, b = np.empty(terms, np.complex128), np.empty(terms, np.complex128)
     scattered, absorbed = fill_coefficients(x, m, a, b)
@@ -189,11 +186,24 @@ def efficiencies_of_one(x: float, m: Any) -> tuple[float, float, float, float, f
 
 
 @_kernel
+def efficiencies_of_one(x: float, n: float, k: float) -> tuple[float, float, float, float, float]:
+    """Return Q_ext, Q_sca, Q_abs, Q_back and g of one sphere of index n - ik; real arithmetic for k = 0.
+
+    Two floats, because a complex argument would cost 2 us on its way from Python.
+    """
+    if k != 0.0:
+        return _efficiencies(x, complex(n, -abs(k)))
+    if n == 1.0:
+        return 0.0, 0.0, 0.0, 0.0, 0.0
+    return _efficiencies(x, n)
+
+
+@_kernel
 def efficiencies_of_many(x: Array, m: ComplexArray) -> Array:
     """Return Q_ext, Q_sca, Q_abs, Q_back and g of every sphere, shape (5, count)."""
     out = np.empty((5, x.size))
     for i in range(x.size):
-        one = efficiencies_of_one(x[i], m[i].real) if m[i].imag == 0.0 else efficiencies_of_one(x[i], m[i])
+        one = efficiencies_of_one(x[i], m[i].real, m[i].imag)
         out[0, i], out[1, i], out[2, i], out[3, i], out[4, i] = one
     return out
 
@@ -273,21 +283,23 @@ def _amplitudes_on_axis(a: ComplexArray, b: ComplexArray, mu: float) -> tuple[co
 
 
 @_kernel
-def amplitudes_of_one(x: float, m: Any, mu: Array) -> tuple[ComplexArray, ComplexArray]:
-    """Return S1 and S2 of one sphere at the cosines ``mu``."""
-    terms = number_of_terms(x) if m != 1.0 else 0
+def amplitudes_of_one(x: float, n: float, k: float, mu: Array) -> tuple[ComplexArray, ComplexArray]:
+    """Return S1 and S2 at the cosines ``mu`` of one sphere of index n - ik."""
+    terms = 0 if n == 1.0 and k == 0.0 else number_of_terms(x)
     a, b = np.empty(terms, np.complex128), np.empty(terms, np.complex128)
-    if terms > 0:
-        fill_coefficients(x, m, a, b)
+    if terms > 0 and k == 0.0:
+        fill_coefficients(x, n, a, b)
+    elif terms > 0:
+        fill_coefficients(x, complex(n, -abs(k)), a, b)
     return amplitudes_from(a, b, mu)
 
 
 @_kernel
-def mean_intensity_of_many(x: Array, m: Any, weights: Array, mu: Array) -> Array:
+def mean_intensity_of_many(x: Array, m: complex, weights: Array, mu: Array) -> Array:
     """Return the weighted sum over spheres of ``|S1|**2 + |S2|**2`` at the cosines ``mu``."""
     total = np.zeros(mu.size)
     for i in range(x.size):
-        s1, s2 = amplitudes_of_one(x[i], m, mu)
+        s1, s2 = amplitudes_of_one(x[i], m.real, m.imag, mu)
         for j in range(mu.size):
             one, two = s1[j], s2[j]
             square = one.real * one.real + one.imag * one.imag + two.real * two.real + two.imag * two.imag

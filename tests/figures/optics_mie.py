@@ -141,7 +141,8 @@ def speed() -> None:
         rounds = np.array([(seconds(ours, repeat), seconds(theirs, repeat)) for _ in range(ROUNDS)])
         a, b = np.median(rounds, axis=0) * 1e6
         print(
-            f"{label:38s} imclab {a:9.1f} us   miepython {b:9.1f} us   ratio {np.median(rounds[:, 1] / rounds[:, 0]):5.2f}"
+            f"{label:38s} imclab {a:9.1f} us   miepython {b:9.1f} us   "
+            f"ratio {np.median(rounds[:, 1] / rounds[:, 0]):5.2f}"
         )
 
 

@@ -17,8 +17,11 @@ from imclab.transport import phase_sampling
 
 @numba.njit(nogil=True)
 def mean_of_draws(table, count, seed, narrow, wide):
-    """Sums over draws: s, s squared, and how many lie within two limits of s."""
-    np.random.seed(seed)  # noqa: NPY002: numba's own generator, its cost is part of the figure
+    """Sums over draws: s, s squared, and how many lie within two limits of s.
+
+    The numbers are numba's own: making them is part of the figure.
+    """
+    np.random.seed(seed)  # noqa: NPY002
     total = squares = 0.0
     inside_narrow = inside_wide = 0
     for _ in range(count):
@@ -60,7 +63,8 @@ def speed() -> None:
             rounds.append(((middle - start) * 100, (time.process_time() - middle) * 100))
         draw, uniform = np.median(rounds, axis=0)
         print(
-            f"  {name:24s} {table.density.size:6d} cells   {draw:5.1f} ns, of which the uniform number {uniform:4.1f} ns"
+            f"  {name:24s} {table.density.size:6d} cells   {draw:5.1f} ns, "
+            f"of which the uniform number {uniform:4.1f} ns"
         )
 
 
@@ -73,7 +77,8 @@ def tables() -> None:
         true = float(function.backward_probability(np.array([glory]))[0])
         found = 1 - np.interp(2 - glory, table.edges, table.cumulative)
         print(
-            f"  Mie x = {x:<6g} {table.density.size:6d} cells   g {table.asymmetry - function.asymmetry:+.1e}   "
+            f"  Mie x = {x:<6g} {table.density.size:6d} cells   "
+            f"g {table.asymmetry - function.asymmetry:+.1e}   "
             f"P2 {table.second_moment - function.second_moment:+.1e}   glory {found / true - 1:+.1e}"
         )
 
