@@ -7,6 +7,7 @@ Plan a gate from a target's distance, program it, read it back, and leave the ge
 """
 
 from rig.errors import (
+    Fault,
     InstrumentError,
     LimitError,
     LinkError,
@@ -19,6 +20,7 @@ from rig.errors import (
 )
 from rig.gate_file import load_gate
 from rig.generator import AppliedGate, Generator
+from rig.interruption import interruptible
 from rig.limits import Limits, load_limits
 from rig.opening import open_generator, switch_off
 from rig.peak import Target, find_target
@@ -33,6 +35,7 @@ from rig.verified import Applied, differences
 __all__ = [
     "Applied",
     "AppliedGate",
+    "Fault",
     "GatePlan",
     "Generator",
     "InstrumentError",
@@ -52,6 +55,7 @@ __all__ = [
     "calibrated_offset",
     "differences",
     "find_target",
+    "interruptible",
     "load_gate",
     "load_limits",
     "open_generator",

@@ -225,7 +225,8 @@ def simulate(
     )
     print(json.dumps(data) if as_json else "\n".join([*lines, f"side door {door}"]), flush=True)
     try:
-        server.run()
+        with rig.interruptible():
+            server.run()
     finally:
         server.close()
 
@@ -273,11 +274,16 @@ def _stay_armed(hold: str | None) -> None:
 
 def _run_grab(command: str, step: rig.ScanStep) -> float | None:
     """Run the user's command at a step; what it prints is a number, or the name of a frame to average."""
-    words = command.format(index=step.index, delay_ps=step.read_ps, distance_m=step.distance_m)
-    told = subprocess.run(words, shell=True, check=True, capture_output=True, text=True).stdout.strip()
-    if not told:
+    words = command
+    for name, value in (("index", step.index), ("delay_ps", step.read_ps), ("distance_m", step.distance_m)):
+        words = words.replace(f"{{{name}}}", str(value))
+    done = subprocess.run(words, shell=True, check=False, capture_output=True, text=True)
+    if done.returncode:
+        came = f"exit {done.returncode} of {words!r}: {done.stderr.strip()[-200:]}"
+        raise rig.PlanError("scan", [rig.Fault("--grab", came, "a command that ends well")])
+    if not done.stdout.strip():
         return None
-    last = told.splitlines()[-1]
+    last = done.stdout.strip().splitlines()[-1]
     try:
         return float(last)
     except ValueError:

@@ -154,6 +154,9 @@ class SimulatorServer:
     def stop(self) -> None:
         """End ``run``; from any thread."""
         self._stopping = True
+        self._wake_up()
+
+    def _wake_up(self) -> None:
         if self._waker is not None:
             with contextlib.suppress(OSError):
                 self._waker.send(b"x")
@@ -169,7 +172,11 @@ class SimulatorServer:
         self._selector.close()
 
     def unplug(self, seconds: float) -> None:
-        """Drop every connection and refuse new ones for a while."""
+        """Drop every connection and refuse new ones for a while; from any thread."""
+        self._at(0.0, functools.partial(self._unplug, seconds))
+        self._wake_up()
+
+    def _unplug(self, seconds: float) -> None:
         for connection in list(self._connections):
             self._drop(connection)
         if self._pty is not None:

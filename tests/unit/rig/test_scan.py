@@ -132,7 +132,7 @@ def sweep_of(noise: float, seed: int, target: float) -> tuple[rig.GatePlan, list
 
 
 def test_the_target_is_found_with_an_honest_uncertainty() -> None:
-    """Pulls of 300 sweeps: mean near 0, spread near 1 (standard errors 0.06 and 0.04, with a margin for the grid)."""
+    """Pulls of 300 sweeps: mean near 0, spread near 1 (standard errors 0.06, 0.04; the rest is the grid)."""
     pulls = []
     for seed in range(300):
         target = 39.9 + random.Random(seed).random() * 0.2

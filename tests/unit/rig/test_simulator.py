@@ -205,9 +205,8 @@ def test_raw_sockets_and_the_side_door() -> None:
             "Stanford Research Systems,DG645,s/n004025,ver1.14.10E",
             "2,+0.000000010000",
         ]
-        told = [json.loads(one) for one in ask(
-            simulated.side_door, "fault truncate count=1", "feed TSRC1", "trigger", "edges", "nonsense", "fault x", "help"
-        )]  # fmt: skip
+        words = ("fault truncate count=1", "feed TSRC1", "trigger", "edges", "nonsense", "fault x", "help")
+        told = [json.loads(one) for one in ask(simulated.side_door, *words)]
         assert told[0]["active"] == ["truncate"]
         assert told[2]["fired"] and len(told[3]["edges"]) == 8
         assert "error" in told[4] and "error" in told[5]
@@ -246,8 +245,7 @@ def test_a_pty_outlives_its_clients_and_its_name_goes_with_it(tmp_path: Path) ->
 
 
 def test_a_port_that_is_taken_is_told() -> None:
-    with socket.create_server(("127.0.0.1", 0)) as taken:
-        with pytest.raises(rig.PlanError, match="a free port"):
-            rig.simulate(tcp=f"127.0.0.1:{taken.getsockname()[1]}").open()
+    with socket.create_server(("127.0.0.1", 0)) as taken, pytest.raises(rig.PlanError, match="a free port"):
+        rig.simulate(tcp=f"127.0.0.1:{taken.getsockname()[1]}").open()
     with pytest.raises(rig.PlanError, match="HOST:PORT"):
         rig.simulate(tcp="nowhere")
