@@ -32,7 +32,7 @@ class GroupLedger:
     sampled_share : float
         Known share of packets that take part in the sampling.
     stop_at : str
-        Name of the tally whose relative error stops a run.
+        Name of the tally that stops a run: the largest relative error in its first column.
     """
 
     def __init__(self, exact: Tally, *, sampled_share: float, stop_at: str) -> None:
@@ -56,20 +56,16 @@ class GroupLedger:
         self._counts[group] += tally["sampled"][0]
         self._batches += 1
 
-    def relative_error(self, quantity: str) -> float:
-        """Return the largest relative standard error of the sums that stop a run.
-
-        ``quantity`` selects a column of them; what is nothing but computed has no error.
-        """
-        column = int(quantity)
-        exact = self._exact[self._stop_at][..., column]
+    def relative_error(self) -> float:
+        """Return the largest relative standard error in the tally that stops a run."""
+        exact = self._exact[self._stop_at][..., 0]
         if self._sampled_share == 0.0:
             return 0.0
         used = np.flatnonzero(self._counts)
         if used.size < 2:
             return np.inf
         counts = self._counts[used]
-        sums = self._sums[self._stop_at][used][..., column]
+        sums = self._sums[self._stop_at][used][..., 0]
         mean = sums.sum(axis=0) / counts.sum()
         spread = np.sum((sums - counts[:, None] * mean) ** 2, axis=0) * used.size / (used.size - 1)
         stderr = self._sampled_share * np.sqrt(spread) / counts.sum()

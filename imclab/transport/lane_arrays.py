@@ -10,15 +10,15 @@ from numpy.typing import NDArray
 from imclab.optics.phase_table import PhaseTable
 from imclab.transport.scattering import HenyeyGreensteinLaw
 
-BATCH_SIZE = 1 << 18
+FOLLOWED_PER_BATCH = 1 << 16
 LANES = 1024
-"""Packets in flight: their properties, 50 kB, and the buffers beside them stay in the second cache."""
+"""Packets in flight: their properties, 57 kB, and the buffers beside them stay in the second cache."""
 RECORDS = 2048
 RADIAL_BINS = 1024
 DELAY_BINS = 512
 ROULETTE_WEIGHT = 1e-3
 
-PROPERTIES = 10
+PROPERTIES = 11
 """Rows of single-precision properties of a packet."""
 NUMBERS = 5
 """Rows of whole numbers of a packet."""

@@ -25,7 +25,7 @@ from numba.extending import overload
 
 from imclab.transport import phase_sampling
 from imclab.transport.kernel_cache import cached_kernel_without_allocation, device
-from imclab.transport.lane_arrays import DELAY_BINS, LANES, RADIAL_BINS, RECORDS
+from imclab.transport.lane_arrays import DELAY_BINS, LANES, PROPERTIES, RADIAL_BINS, RECORDS
 from imclab.transport.random import (
     azimuth32,
     exp32,
@@ -37,8 +37,11 @@ from imclab.transport.random import (
 )
 from imclab.transport.scattering import henyey_greenstein_deviation, is_closed_form, turn_in
 
-# Properties of a packet: rows of one array, so that LLVM sees that they cannot overlap.
-_X, _Y, _Z, _DX, _DY, _DZ, _PATH, _DEATH, _LIMIT, _DEVIATION = (np.uint64(LANES * row) for row in range(10))
+# Properties of a packet: rows of one array, so that LLVM sees that they cannot overlap. Place and path
+# are those where the flight starts, and the step is the flight: a plane is reached from the start
+# without the cancellation that going back from a far end would bring.
+_ROWS = tuple(np.uint64(LANES * row) for row in range(PROPERTIES))
+_X, _Y, _Z, _DX, _DY, _DZ, _PATH, _DEATH, _STEP, _LIMIT, _DEVIATION = _ROWS
 # Whole numbers of a packet: its history within the batch, its event, and random words.
 _HISTORY, _EVENT, _WORD0, _WORD1, _WORD2 = (np.uint64(LANES * row) for row in range(5))
 _LAUNCH, _ENDS, _WALK = np.uint64(0), np.uint64(1), np.uint64(2)
@@ -85,7 +88,7 @@ def follow(slab: Any, seed: Any, first_history: Any, count: int, sums: Any, work
 
 @device
 def _launch(slab: Any, seed: Any, first: Any, launched: Any, fresh: Any, pool: Any, numbers: Any) -> None:
-    """Put ``fresh`` packets at their first collisions into the pool (eqs. 1 to 3)."""
+    """Put ``fresh`` packets with their first flights into the pool (eqs. 1 to 3)."""
     for j in range(fresh):
         i = np.uint64(j)
         history = np.uint64(launched + j)
@@ -99,12 +102,10 @@ def _launch(slab: Any, seed: Any, first: Any, launched: Any, fresh: Any, pool: A
         sine, dz = sine_cosine32(polar)
         azimuth_sine, azimuth_cosine = azimuth32(w3)
         dx, dy = sine * azimuth_cosine, sine * azimuth_sine
-        path = -slab.mean_free_path * _log_of_one_less(slab.followed * uniform32(w4))
-        pool[_X + i] = radius * place_cosine + path * dx
-        pool[_Y + i] = radius * place_sine + path * dy
-        pool[_Z + i] = path * dz
+        pool[_X + i], pool[_Y + i], pool[_Z + i] = radius * place_cosine, radius * place_sine, _ZERO
         pool[_DX + i], pool[_DY + i], pool[_DZ + i] = dx, dy, dz
-        pool[_PATH + i] = path
+        pool[_PATH + i] = _ZERO
+        pool[_STEP + i] = -slab.mean_free_path * _log_of_one_less(slab.followed * uniform32(w4))
         excess = -log32(uniform32(w5)) * (_ONE / max(slab.absorption, np.float32(1e-30)))
         pool[_DEATH + i] = slab.roulette_path + min(excess, _LONGEST)
 
@@ -131,7 +132,7 @@ def _enter(
 ) -> Any:
     """Move a packet from the pool into a lane; return 1, or 0 when it has no first collision."""
     source, goal = np.uint64(taken), np.uint64(lane)
-    z, path = pool[_Z + source], pool[_PATH + source]
+    z, path = pool[_STEP + source] * pool[_DZ + source], pool[_STEP + source]
     last = slab.planes.size - 1
     if not (z > _ZERO and z < slab.planes[last]):
         return 0  # leaves unscattered: that part is computed
@@ -139,7 +140,7 @@ def _enter(
     if path >= pool[_DEATH + source]:
         sums.absorbed[0] += 1.0
         return 0
-    for row in range(8):
+    for row in range(9):
         shift = np.uint64(LANES * row)
         lanes[goal + shift] = pool[source + shift]
     numbers[_HISTORY + goal] = pool_numbers[_HISTORY + source]
@@ -156,7 +157,7 @@ def _enter(
 def _copy(lanes: Any, numbers: Any, plane: Any, source_lane: Any, goal_lane: Any) -> None:
     """Copy a living packet into the lane of one that has ended."""
     source, goal = np.uint64(source_lane), np.uint64(goal_lane)
-    for row in range(9):
+    for row in range(10):
         shift = np.uint64(LANES * row)
         lanes[goal + shift] = lanes[source + shift]
     numbers[_HISTORY + goal] = numbers[_HISTORY + source]
@@ -203,35 +204,37 @@ def _overload_deviate(phase: Any, numbers: Any, lanes: Any, alive: Any) -> Any:
 
 @device
 def _move(mean_free_path: Any, numbers: Any, lanes: Any, crossed: Any, alive: Any) -> None:
-    """Turn and move every lane, and mark those that may have crossed a plane or been absorbed."""
+    """Take every lane to its collision, turn it, draw its flight; mark what may cross or be absorbed."""
     for j in range(alive):
         i = np.uint64(j)
-        sine, cosine = azimuth32(numbers[_WORD1 + i])
+        step = lanes[_STEP + i]
         direction = (lanes[_DX + i], lanes[_DY + i], lanes[_DZ + i])
+        lanes[_X + i] += step * direction[0]
+        lanes[_Y + i] += step * direction[1]
+        z, path = lanes[_Z + i] + step * direction[2], lanes[_PATH + i] + step
+        lanes[_Z + i], lanes[_PATH + i] = z, path
+        sine, cosine = azimuth32(numbers[_WORD1 + i])
         dx, dy, dz = turn_in(_ONE, direction, lanes[_DEVIATION + i], sine, cosine)
-        step = -mean_free_path * log32(uniform32(numbers[_WORD2 + i]))
-        z, path = lanes[_Z + i] + step * dz, lanes[_PATH + i] + step
-        lanes[_X + i] += step * dx
-        lanes[_Y + i] += step * dy
-        lanes[_Z + i] = z
         lanes[_DX + i], lanes[_DY + i], lanes[_DZ + i] = dx, dy, dz
-        lanes[_PATH + i] = path
-        crossed[i] = (z <= _ZERO) | (z >= lanes[_LIMIT + i]) | (path >= lanes[_DEATH + i])
+        step = -mean_free_path * log32(uniform32(numbers[_WORD2 + i]))
+        lanes[_STEP + i] = step
+        end = z + step * dz
+        crossed[i] = (end <= _ZERO) | (end >= lanes[_LIMIT + i]) | (path + step >= lanes[_DEATH + i])
 
 
 @device
 def _cross(slab: Any, lanes: Any, lane: Any, plane: Any, records: Any, filled: Any, sums: Any) -> Any:
-    """Write down what a marked lane has crossed; return the filled records and whether it has ended."""
+    """Write down what a marked lane crosses; return the filled records and whether it ends."""
     i, planes = np.uint64(lane), slab.planes
-    x, y, z, path = lanes[_X + i], lanes[_Y + i], lanes[_Z + i], lanes[_PATH + i]
-    dx, dy, slope = lanes[_DX + i], lanes[_DY + i], _ONE / lanes[_DZ + i]
+    z, path, step, dz = lanes[_Z + i], lanes[_PATH + i], lanes[_STEP + i], lanes[_DZ + i]
+    end, slope, death = z + step * dz, _ONE / dz, lanes[_DEATH + i]
     next_plane = plane[lane]
-    while next_plane < planes.size and z >= planes[next_plane]:
-        back = (z - planes[next_plane]) * slope
-        if path - back >= lanes[_DEATH + i]:
+    while next_plane < planes.size and end >= planes[next_plane]:
+        way = (planes[next_plane] - z) * slope
+        if path + way >= death:
             break
-        records.x[filled], records.y[filled] = x - back * dx, y - back * dy
-        records.path[filled], records.excess[filled] = path - back, path - back - planes[next_plane]
+        _record(lanes, i, way, records, filled)
+        records.excess[filled] = path + way - planes[next_plane]
         records.row[filled] = next_plane
         filled += 1
         next_plane += 1
@@ -239,16 +242,23 @@ def _cross(slab: Any, lanes: Any, lane: Any, plane: Any, records: Any, filled: A
         return filled, True
     plane[lane] = next_plane
     lanes[_LIMIT + i] = planes[next_plane]
-    back = z * slope
-    if z <= _ZERO and path - back < lanes[_DEATH + i]:
-        records.x[filled], records.y[filled] = x - back * dx, y - back * dy
-        records.path[filled], records.excess[filled] = path - back, path - back
+    if end <= _ZERO and path - z * slope < death:
+        _record(lanes, i, -z * slope, records, filled)
+        records.excess[filled] = path - z * slope
         records.row[filled] = planes.size + next_plane
         return filled + 1, True
-    if path >= lanes[_DEATH + i]:
+    if path + step >= death:
         sums.absorbed[0] += 1.0
         return filled, True
     return filled, False
+
+
+@device
+def _record(lanes: Any, i: Any, way: Any, records: Any, filled: Any) -> None:
+    """Write down place and path after a way along the flight."""
+    records.x[filled] = lanes[_X + i] + way * lanes[_DX + i]
+    records.y[filled] = lanes[_Y + i] + way * lanes[_DY + i]
+    records.path[filled] = lanes[_PATH + i] + way
 
 
 @device

@@ -96,7 +96,8 @@ def make(
 
     notes = () if followed > 0.0 else ("nothing is scattered: all of it is computed",)
     exact = _unscattered_sums(water, beam, planes, slab)
-    estimator = Estimator("one-way", batch, lane_arrays.BATCH_SIZE, exact=exact._asdict(), notes=notes)
+    batch_size = round(lane_arrays.FOLLOWED_PER_BATCH / max(followed, 1e-9))
+    estimator = Estimator("one-way", batch, batch_size, exact=exact._asdict(), notes=notes)
     return estimator, unscattered.scattered_share(unscattered.rays_of(beam), water.scattering, farthest)
 
 

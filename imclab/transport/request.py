@@ -18,7 +18,6 @@ def limits(
     rel_error: float | None,
     seconds: float | None,
     packets: float | None,
-    quantity: str,
 ) -> Until:
     """Return when to stop: as asked, else as the scene says, else at 1 % relative error."""
     asked = {"rel_error": rel_error, "seconds": seconds, "packets": packets}
@@ -36,7 +35,7 @@ def limits(
     if faults:
         raise InputError("run", faults)
     count = None if asked["packets"] is None else round(asked["packets"])
-    return Until(asked["rel_error"], asked["seconds"], count, quantity)
+    return Until(asked["rel_error"], asked["seconds"], count)
 
 
 def seed_of(scene: Scene, seed: int | None) -> int:

@@ -53,12 +53,11 @@ class Estimator:
 
 @dataclass(frozen=True)
 class Until:
-    """When to stop: at the first of the limits that are given; ``quantity`` is whose error counts."""
+    """When to stop: at the first of the limits that are given."""
 
     rel_error: float | None = None
     seconds: float | None = None
     packets: int | None = None
-    quantity: str = "total"
 
 
 @dataclass(frozen=True)
@@ -90,8 +89,8 @@ class Ledger(Protocol):
     def enter(self, tally: Tally, count: int) -> None:
         """Enter the sums of one batch of ``count`` histories."""
 
-    def relative_error(self, quantity: str) -> float:
-        """Return the standard error of a quantity over its mean; infinite when it is not known."""
+    def relative_error(self) -> float:
+        """Return the relative standard error that can stop a run; infinite when it is not known."""
 
 
 class MeanLedger:
@@ -101,10 +100,11 @@ class MeanLedger:
     history and the variance of the overall mean m is that over N (West 1979, CACM 22, 532).
     """
 
-    def __init__(self, exact: Tally | None = None) -> None:
+    def __init__(self, exact: Tally, *, stop_at: str) -> None:
+        self._stop_at = stop_at
         self.histories = 0
         self.batches = 0
-        self._exact = dict(exact or {})
+        self._exact = dict(exact)
         self._means: dict[str, NDArray[np.float64]] = {}
         self._spreads: dict[str, NDArray[np.float64]] = {}
 
@@ -136,11 +136,11 @@ class MeanLedger:
             return np.full_like(self._spreads[name], np.inf)
         return np.sqrt(self._spreads[name] / ((self.batches - 1) * self.histories))
 
-    def relative_error(self, quantity: str) -> float:
-        """Return the standard error of a quantity over its mean, the largest if it is an array."""
+    def relative_error(self) -> float:
+        """Return the largest relative standard error of the quantity that stops a run."""
         if self.batches < 2:
             return np.inf
-        mean, stderr = np.abs(self.mean(quantity)), self.stderr(quantity)
+        mean, stderr = np.abs(self.mean(self._stop_at)), self.stderr(self._stop_at)
         known = mean > 0.0
         return float(np.max(stderr[known] / mean[known])) if known.any() else np.inf
 
@@ -200,9 +200,8 @@ def run(
             tally, count, cpu = pending.popleft().result()
             ledger.enter(tally, count)
             packets, batches, cpu_seconds = packets + count, batches + 1, cpu_seconds + cpu
-            reached = Reached(
-                batches, packets, time.perf_counter() - start, ledger.relative_error(until.quantity)
-            )
+            seconds = time.perf_counter() - start
+            reached = Reached(batches, packets, seconds, ledger.relative_error())
             if progress is not None:
                 progress(reached)
             if _enough(reached, until):
@@ -213,7 +212,7 @@ def run(
         interrupted = True
     finally:
         pool.shutdown(wait=True, cancel_futures=True)
-    nothing = until.rel_error is not None and np.isinf(ledger.relative_error(until.quantity))
+    nothing = until.rel_error is not None and np.isinf(ledger.relative_error())
     notes = ("no packet brought any energy, so the relative error is not known",) if nothing else ()
     wall_seconds = time.perf_counter() - start
     return Effort(packets, batches, cpu_seconds, wall_seconds, count_threads, interrupted, notes)

@@ -78,7 +78,7 @@ def simulate(
     from imclab.transport.setup import setup_of
     from imclab.transport.time_histogram import time_edges
 
-    until = limits(scene, rel_error=rel_error, seconds=seconds, packets=packets, quantity="total")
+    until = limits(scene, rel_error=rel_error, seconds=seconds, packets=packets)
     used_seed = seed_of(scene, seed)
     check_threads(threads)
     if not 0 <= time_bins <= MOST_TIME_BINS:
@@ -86,7 +86,7 @@ def simulate(
     setup = setup_of(scene, time_bins=time_bins)
     edges = time_edges(scene, setup, time_bins) if time_bins else None
     chosen = _with_totals(choose(estimator or scene.run.estimator, setup), scene, setup, edges)
-    ledger = MeanLedger(chosen.exact)
+    ledger = MeanLedger(chosen.exact, stop_at="total")
     effort = run(chosen, ledger, until, seed=used_seed, threads=threads, progress=progress)
     joules = scene.laser.pulse_energy
     parts: dict[str, Any] = {}

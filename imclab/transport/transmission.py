@@ -72,7 +72,7 @@ def transmit(
     from imclab.transport.setup import beam_of, pulse_sigma
 
     planes = _planes([scene.target.distance] if distances is None else distances)
-    until = limits(scene, rel_error=rel_error, seconds=seconds, packets=packets, quantity="0")
+    until = limits(scene, rel_error=rel_error, seconds=seconds, packets=packets)
     used_seed = seed_of(scene, seed)
     check_threads(threads)
     water, phase = water_of(scene)
