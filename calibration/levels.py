@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,8 +57,16 @@ class Levels:
     known_stderr: float = 1e-3
 
 
-def straightened(measured: Levels, curve: PchipInterpolator) -> tuple[Levels, Floats]:
-    """Take off what a bent response adds to the mean counts of noisy light; give also its slope.
+class Straightened(NamedTuple):
+    """Levels with straightened means; the response's slope there; the shift as relative exposure."""
+
+    levels: Levels
+    slope: Floats
+    shift: Floats
+
+
+def straightened(measured: Levels, curve: PchipInterpolator) -> Straightened:
+    """Take off what a bent response adds to the mean counts of noisy light.
 
     Light that varies has a mean answer other than the answer to its mean. Its events are taken as
     gamma distributed with the variance that the counts show; their mean answer is a sum over
@@ -81,7 +90,8 @@ def straightened(measured: Levels, curve: PchipInterpolator) -> tuple[Levels, Fl
         shift = np.mean(answers, axis=1) - _answer(curve, centre)
         counts = np.maximum(measured.counts - shift, 0.5 * measured.counts)
     error = np.hypot(measured.counts_stderr, SHIFT_ERROR * np.abs(shift))
-    return replace(measured, counts=counts, counts_stderr=error), slope
+    relative_shift = np.abs(shift) / counts * slope
+    return Straightened(replace(measured, counts=counts, counts_stderr=error), slope, relative_shift)
 
 
 def _answer(curve: PchipInterpolator, log_exposure: Floats) -> Floats:

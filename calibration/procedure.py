@@ -31,6 +31,7 @@ from calibration.tally import LAG_REACH
 Floats = NDArray[np.float64]
 
 RESPONSE_DRAWS = 24
+BENT_NOISE = 8e-3  # relative: what photon transfer is off by through a bent response (measured)
 RANGE_SIGMAS = 4.0  # how far the noise of the brightest level reaches: counts seen, not extrapolated
 OUTLIER_SIGMAS = 5.0
 
@@ -187,7 +188,8 @@ def _transfers(
         shots = (
             [fit_transfer(_points(members, darks[gain], draw)).shot for draw in draws] if members else [0.0]
         )
-        systematic.append(float(np.std(shots) / found.shot) if found.shot > 0.0 else math.nan)
+        bent = BENT_NOISE if _is_bent(response) else 0.0
+        systematic.append(math.hypot(np.std(shots) / found.shot, bent) if found.shot > 0.0 else math.nan)
         if found.outliers:
             few = ", ".join(members[index].where for index in found.outliers[:3])
             named = f"{few}{', ...' if len(found.outliers) > 3 else ''}"
@@ -196,6 +198,12 @@ def _transfers(
                 f"photon transfer; little weight was given to them ({named})"
             )
     return transfers, systematic
+
+
+def _is_bent(response: Response) -> bool:
+    """Whether the response departs from a straight line through the origin by more than 2 % somewhere."""
+    share = response.exposure(np.exp(response.log_counts)) / np.exp(response.log_counts)
+    return bool(share.max() > 1.02 * share.min())
 
 
 def _drawn_responses(fit: JointFit, response: Response) -> list[Response]:

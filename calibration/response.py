@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scipy import linalg, optimize
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
-from calibration.levels import Levels, straightened
+from calibration.levels import SHIFT_ERROR, Levels, straightened
 
 Floats = NDArray[np.float64]
 Integers = NDArray[np.intp]
@@ -96,7 +96,7 @@ def fit_jointly(levels: Levels) -> JointFit:
         solved = [_solve(centres[bend], designs[bend], levels) for bend in BENDS]
         mean = min(solved, key=lambda solution: solution.value).mean[: nodes.size]
         curve = PchipInterpolator(np.log(nodes), rising(mean))
-        levels, slope = straightened(measured, curve)
+        levels, slope, shift = straightened(measured, curve)
     nodes = _place_nodes(levels)
     solutions: list[_Solution] = []
     sizes: list[Floats] = []
@@ -106,7 +106,18 @@ def fit_jointly(levels: Levels) -> JointFit:
             solutions.append(_solve(size, design, levels, with_covariance=True))
             sizes.append(size)
     fit = _average(levels, nodes, solutions, np.array(sizes))
-    return replace(fit, log_exposure=fit.log_exposure + middle)
+    covariance = fit.covariance + _shared_shift(levels, shift, nodes.size)
+    return replace(fit, log_exposure=fit.log_exposure + middle, covariance=covariance)
+
+
+def _shared_shift(levels: Levels, shift: Floats, nodes: int) -> Floats:
+    """Covariance of the gains from what the noise law gets wrong alike in all runs of a setting."""
+    variance = np.zeros(nodes + len(levels.gains))
+    for setting in range(len(levels.gains)):
+        here = levels.setting == setting
+        if setting != levels.reference and here.any():
+            variance[nodes + setting] = float(SHIFT_ERROR * shift[here].mean()) ** 2
+    return np.diag(variance)
 
 
 def _place_nodes(levels: Levels) -> Floats:
