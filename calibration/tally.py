@@ -15,7 +15,8 @@ import scipy.fft
 from numpy.typing import NDArray
 
 LAG_REACH = 5  # pixels; a spread of 1 px leaves 1 part in 500 of its correlation outside
-LAG_PAIRS = 2  # pairs of each run that the neighbour covariance is taken from: all runs are pooled
+LAG_PAIRS = 2  # frame pairs of each run that the neighbour covariance is taken from, at least;
+LAG_PIXELS = 400_000  # more of small frames (all runs are pooled)
 OUTLIER_SIGMAS = 6.0
 
 Floats = NDArray[np.float64]
@@ -177,7 +178,7 @@ class Tally:
         sums = region.block_sums(weighted)
         squares = region.block_sums(weighted * jump)
         self._pairs.append(0.5 * (squares - sums**2 / pixels) / (pixels - 1.0))
-        if len(self._lags) < LAG_PAIRS:
+        if len(self._lags) < max(LAG_PAIRS, LAG_PIXELS // region.pixels):
             self._lags.append(_lag_covariance(jump, weighted, region))
 
     @property
