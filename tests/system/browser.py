@@ -6,6 +6,7 @@ import base64
 import itertools
 import json
 import os
+import select
 import shutil
 import subprocess
 import tempfile
@@ -14,6 +15,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+PATIENCE_SECONDS = 60
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 _FLAGS = (
     "--headless",
@@ -41,7 +43,7 @@ class Tab:
     def __init__(self, process: subprocess.Popen[bytes], commands: int, answers: int) -> None:
         self._process = process
         self._commands = commands
-        self._answers = os.fdopen(answers, "rb", buffering=0)
+        self._answers = answers
         self._numbers = itertools.count(1)
         self._unread = b""
         self._session = ""
@@ -66,7 +68,9 @@ class Tab:
 
     def _read(self) -> dict[str, Any]:
         while b"\0" not in self._unread:
-            chunk = self._answers.read(1 << 20)
+            ready, _, _ = select.select([self._answers], [], [], PATIENCE_SECONDS)
+            assert ready, f"the browser said nothing for {PATIENCE_SECONDS} s"
+            chunk = os.read(self._answers, 1 << 20)
             assert chunk, f"the browser ended with exit code {self._process.poll()}"
             self._unread += chunk
         message, self._unread = self._unread.split(b"\0", 1)
@@ -87,6 +91,7 @@ class Tab:
             mobile=phone,
         )
         self.ask("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+        self.ask("Emulation.setTouchEmulationEnabled", enabled=phone)
         self.events.clear()
         self.ask("Page.navigate", url=page.resolve().as_uri())
         self.wait_for("Page.loadEventFired")
@@ -97,10 +102,22 @@ class Tab:
         assert "exceptionDetails" not in answer, answer["exceptionDetails"]
         return answer["result"].get("value")
 
-    def press(self, key: str, code: int) -> None:
-        """Press and release a key in whatever has the focus."""
-        for kind in ("rawKeyDown", "keyUp"):
-            self.ask("Input.dispatchKeyEvent", type=kind, key=key, code=key, windowsVirtualKeyCode=code)
+    def press(self, key: str, code: int, text: str = "") -> None:
+        """Press and release a key in whatever has the focus; ``text`` is what it would type."""
+        down = {"type": "keyDown", "text": text} if text else {"type": "rawKeyDown"}
+        for kind in (down, {"type": "keyUp"}):
+            self.ask("Input.dispatchKeyEvent", key=key, code=key, windowsVirtualKeyCode=code, **kind)
+
+    def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
+        """Drag a finger over the page, as a phone reports it."""
+        for kind, place in (("touchStart", start), ("touchMove", end), ("touchEnd", None)):
+            points = [] if place is None else [{"x": place[0], "y": place[1]}]
+            self.ask("Input.dispatchTouchEvent", type=kind, touchPoints=points)
+        self.settle()
+
+    def settle(self) -> None:
+        """Wait until what has been asked for is drawn."""
+        self.run("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done())))")
 
     def screenshot(self, file: Path, *, whole: bool = False) -> None:
         """Save what is seen, or the whole page, as PNG."""
@@ -146,4 +163,5 @@ def tab(browser: str) -> Iterator[Tab]:
         process.terminate()
         process.wait(20)
         os.close(commands)
+        os.close(answers)
         shutil.rmtree(profile, ignore_errors=True)

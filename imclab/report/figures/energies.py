@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from imclab.agreement import Agreement, judged
 from imclab.comparison import Comparison, Outcome
-from imclab.report.figures.style import BOUND, MARKERS, MEASURED, SIMULATED, new_figure
+from imclab.report.figures.style import BOUND, MARKERS, MEASURED, SIMULATED, Margins, new_figure
 from imclab.uncertainty import COVERAGE_95
 
 
 def energy_curve(comparison: Comparison) -> Figure:
     """Energy ratio against optical depth, and the relative error below with the bound."""
-    figure, axes = new_figure(5.2, 4.8, 2, 1, sharex=True, height_ratios=(3, 2))
+    figure, axes = new_figure(5.2, 4.8, 2, 1, margins=Margins(down=0.12), sharex=True, height_ratios=(3, 2))
     upper, lower = axes[:, 0]
     for index, (reference, group) in enumerate(_groups(comparison).items()):
         depth = np.array([outcome.pair.optical_depth for outcome in group])
@@ -57,7 +57,7 @@ def energy_curve(comparison: Comparison) -> Figure:
         va="bottom",
         color=BOUND,
     )
-    lower.set_ylabel("simulated/measured − 1 / %")
+    lower.set_ylabel("relative error / %")
     lower.set_xlabel("optical depth (attenuation × distance, one way)")
     return figure
 
@@ -70,7 +70,8 @@ def bland_altman(comparison: Comparison, agreement: Agreement) -> Figure:
     for outcome, mean, difference in zip(judged(comparison), altman.mean, altman.difference, strict=True):
         group = references.index(outcome.reference)
         marker = MARKERS[group % len(MARKERS)]
-        plot.plot(mean, 100 * difference, marker, color=SIMULATED, markersize=5.5)
+        label = f"relative to {outcome.reference}"
+        plot.plot(mean, 100 * difference, marker, color=SIMULATED, markersize=5.5, label=label)
         place = (6, 4 if group % 2 == 0 else -11)
         text = f"gain {outcome.pair.gain:g}"
         plot.annotate(text, (mean, 100 * difference), place, textcoords="offset points", fontsize=7)
@@ -89,6 +90,8 @@ def bland_altman(comparison: Comparison, agreement: Agreement) -> Figure:
                 va="bottom",
                 color=BOUND,
             )
+    named = dict(zip(*reversed(plot.get_legend_handles_labels()), strict=True))  # one of each group
+    plot.legend(named.values(), named.keys())
     plot.set_xscale("log")
     _plain_numbers(plot.xaxis)
     plot.margins(x=0.25, y=0.2)

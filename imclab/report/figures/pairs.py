@@ -14,10 +14,11 @@ from imclab.registration import Registration
 from imclab.registration.motion import displacements, moved
 from imclab.report.context import Context
 from imclab.report.detail import Detail
-from imclab.report.figures.style import ACCENT, BOUND, MEASURED, SIMULATED, new_figure, panels
+from imclab.report.figures.style import ACCENT, BOUND, MEASURED, SIMULATED, Margins, new_figure, panels
 from imclab.report.pictures import brightest
 from imclab.uncertainty import COVERAGE_95
 
+_DARK = "#1b2025"  # behind photographs, which the page does not turn to the dark
 _CHI_SQUARE_95 = 5.991  # of two degrees of freedom
 
 
@@ -98,7 +99,9 @@ def _show_light(plot: Any, edges: NDArray[np.float64], share: NDArray[np.float64
 
 def registration_overlays(comparison: Comparison, *, magnified: float = 50.0) -> Figure:
     """Outline of the simulated figure on each measured frame, with error ellipses at its corners."""
-    figure, axes = panels(len(comparison.outcomes), height=2.9)
+    margins = Margins(left=0.1, right=0.1, bottom=0.3, across=0.1, down=0.3)
+    figure, axes = panels(len(comparison.outcomes), height=3.2, margins=margins)
+    figure.set_facecolor(_DARK)
     for plot, outcome in zip(axes, comparison.outcomes, strict=False):
         pair = outcome.pair
         top = brightest(pair)
@@ -111,7 +114,8 @@ def registration_overlays(comparison: Comparison, *, magnified: float = 50.0) ->
             plot.contour(pair.simulated, levels=[(low + high) / 2], colors=["#ff7f2a"], linewidths=0.8)
         if np.isfinite(pair.registration.matrix).all():
             _frame_with_ellipses(plot, pair.registration, magnified)
-        plot.set_title(pair.name if pair.registration.ok else f"{pair.name}: not registered")
+        title = pair.name if pair.registration.ok else f"{pair.name}: not registered"
+        plot.set_title(title, color="white")
         plot.grid(visible=False)
         plot.set_xticks([])
         plot.set_yticks([])

@@ -5,7 +5,7 @@ The page turns lightness round in dark mode, so no figure may mean anything by b
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -37,38 +37,53 @@ STYLE: dict[Any, Any] = {
 }
 
 
-def new_figure(
-    width: float, height: float, rows: int = 1, columns: int = 1, **options: Any
-) -> tuple[Figure, Any]:
-    """Return a figure and its axes with fixed margins, in inches.
+class Margins(NamedTuple):
+    """Room round and between the axes of a figure, inches."""
 
-    Matplotlib's own layouts draw every figure twice, which is half of the time of the whole report.
+    left: float = 0.62
+    right: float = 0.12
+    bottom: float = 0.62
+    top: float = 0.26
+    across: float = 0.62
+    down: float = 0.48
+
+
+def new_figure(
+    width: float,
+    height: float,
+    rows: int = 1,
+    columns: int = 1,
+    *,
+    margins: Margins = Margins(),  # noqa: B008  immutable
+    **options: Any,
+) -> tuple[Figure, Any]:
+    """Return a figure of a size in inches and its axes (rows, columns), with fixed margins.
+
+    Matplotlib's own layouts draw every figure twice, which was half of the time of the report.
     """
     figure = Figure(figsize=(width, height), facecolor="white")
-    left, right, bottom, top, across, down = 0.62, 0.12, 0.62, 0.26, 0.62, 0.48
-    down = 0.12 if options.get("sharex") else down
-    wide = (width - left - right - across * (columns - 1)) / columns
-    high = (height - bottom - top - down * (rows - 1)) / rows
-    margins = {
-        "left": left / width,
-        "right": 1 - right / width,
-        "bottom": bottom / height,
-        "top": 1 - top / height,
-        "wspace": across / wide,
-        "hspace": down / high,
+    wide = (width - margins.left - margins.right - margins.across * (columns - 1)) / columns
+    high = (height - margins.bottom - margins.top - margins.down * (rows - 1)) / rows
+    places = {
+        "left": margins.left / width,
+        "right": 1 - margins.right / width,
+        "bottom": margins.bottom / height,
+        "top": 1 - margins.top / height,
+        "wspace": margins.across / wide,
+        "hspace": margins.down / high,
     }
-    return figure, figure.subplots(rows, columns, squeeze=False, gridspec_kw=margins, **options)
+    return figure, figure.subplots(rows, columns, squeeze=False, gridspec_kw=places, **options)
 
 
-def panels(count: int, *, height: float) -> tuple[Figure, list[Any]]:
-    """Return a figure with ``count`` panels in rows of three; unused ones are taken away."""
+def panels(count: int, *, height: float, margins: Margins = Margins()) -> tuple[Figure, list[Any]]:  # noqa: B008
+    """Return a figure with ``count`` panels in rows of three."""
     columns = min(count, 3)
     rows = -(-count // columns)
-    figure, axes = new_figure(3.2 * columns, height * rows, rows, columns)
-    panels = list(axes.ravel())
-    for spare in panels[count:]:
+    figure, axes = new_figure(3.2 * columns, height * rows, rows, columns, margins=margins)
+    every = list(axes.ravel())
+    for spare in every[count:]:
         spare.remove()
-    return figure, panels[:count]
+    return figure, every[:count]
 
 
 def drawn(figure: Figure, *, dpi: int = 180) -> NDArray[np.uint8]:
