@@ -215,7 +215,8 @@ def backscatter_walks(
     for i in range(count):
         history = first + np.uint64(i)
         point, direction, weight, seen = line_of_sight(setup, uniforms(seed, history, 0, BACKSCATTER_STREAM))
-        floor = ROULETTE_WEIGHT * weight
+        # roulette looks at what the water has absorbed: a walk turned home weighs little and counts much
+        kept = 1.0
         path = 0.0
         for event in range(1, MOST_EVENTS):
             if weight == 0.0 or path > latest * water.group_velocity:
@@ -246,11 +247,13 @@ def backscatter_walks(
                 setup, point, direction, peak, (u_choice, u_scatter, u_azimuth)
             )
             weight *= factor * water.albedo
-            if weight < floor:
+            kept *= water.albedo
+            if kept < ROULETTE_WEIGHT:
                 dice, _, _, _ = uniforms(seed, history, event, BACKSCATTER_STREAM + 2)
                 if dice > ROULETTE_CHANCE:
                     break
                 weight /= ROULETTE_CHANCE
+                kept /= ROULETTE_CHANCE
 
 
 def peak_angle(setup: Setup) -> float:

@@ -123,7 +123,7 @@ def _score_times(
     bin_ = time_bin(setup.time, direct.time[row, column] + time)
     if bin_ >= 0:
         tally.times[bin_] += figure * direct.lit[0, row, column] + ground * direct.lit[1, row, column]
-    place = time / axes.impulse_width
+    place = (time - axes.times[0]) / axes.impulse_width
     if place < axes.impulse_bins - 1:
         bin_ = int(place)
         ring, outer = ring_of(axes.radii, math.sqrt(x_land * x_land + y_land * y_land))
@@ -216,7 +216,7 @@ def camera_walks(
                 moved = (x + way * direction[0] - slope_x * reach, y + way * direction[1] - slope_y * reach)
                 energy = weight * math.exp(-water.attenuation * way)
                 _add_moved(setup, radiance[node], tally.picture, centre, inside, moved, participants, energy)
-                if axes.impulse_bins > 0:
+                if setup.time.bins > 0:
                     landing = (looked_at[0] + moved[0], looked_at[1] + moved[1])
                     _score_times(
                         setup, axes, direct, coverage, tally, (looked_at, landing), energy * disc_cells, time

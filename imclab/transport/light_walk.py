@@ -46,14 +46,15 @@ class MapAxes(NamedTuple):
         Camera times, s; a single one when there is no gate.
     cells : int
         Cells along each side of the coarse grid.
-    impulse_width, impulse_bins : float, int
-        Step (s) and number of the times of arrival on the target, from 0; none without a histogram.
+    impulse_start, impulse_width, impulse_bins : float, float, int
+        First time of arrival on the target, step (s) and number; light later than the last counts there.
     """
 
     radii: FloatArray
     ring_areas: FloatArray
     times: FloatArray
     cells: int
+    impulse_start: float
     impulse_width: float
     impulse_bins: int
 
@@ -63,17 +64,17 @@ class LightMaps(NamedTuple):
 
     Attributes
     ----------
-    rings : array (2, times, rings)
-        Light that has not met the target, gated for each camera time.
-    grid : array (2, times, cells, cells)
-        Light that has met it, gated likewise.
     impulses : array (2, impulse bins, rings)
-        Both, before the gate, by time of arrival on the target.
+        Light that has not met the target, by time of arrival, before the gate.
+    late_impulses : array (2, impulse bins, rings)
+        Light that has met it, likewise, as if it were symmetric too; for the time histogram alone.
+    late : array (2, times, cells, cells)
+        Light that has met the target, gated for each camera time.
     """
 
-    rings: FloatArray
-    grid: FloatArray
     impulses: FloatArray
+    late_impulses: FloatArray
+    late: FloatArray
 
 
 @device
@@ -104,57 +105,62 @@ def ring_of(radii: Any, radius: Any) -> Any:
 
 
 @device
-def _score(setup: Any, axes: Any, maps: Any, touched: bool, place: Any, energy: Any, time: Any) -> None:
+def score(setup: Any, axes: Any, maps: Any, touched: bool, place: Any, energy: Any, time: Any) -> None:
     """Enter light that lands at a place (x, y) of the target's plane at a time into the maps."""
-    target, gate = setup.target, setup.gate
+    target = setup.target
     x, y = place
     inside = abs(x) < target.half_width and abs(y) < target.half_height
     radius = math.sqrt(x * x + y * y)
     if radius >= axes.radii[-1] or (touched and not inside):
         return
-    ring, outer = ring_of(axes.radii, radius)
-    inner_area, outer_area = (1.0 - outer) / axes.ring_areas[ring], outer / axes.ring_areas[ring + 1]
     if touched:
         row = int((y / target.half_height + 1.0) * 0.5 * axes.cells)
         column = int((x / target.half_width + 1.0) * 0.5 * axes.cells)
         cell = 4.0 * target.half_width * target.half_height / (axes.cells * axes.cells)
         for n in range(axes.times.shape[0]):
-            share = gate_share(gate, time + axes.times[n]) / cell
-            maps.grid[0, n, row, column] += energy[0] * share
-            maps.grid[1, n, row, column] += energy[1] * share
-    else:
-        for n in range(axes.times.shape[0]):
-            share = gate_share(gate, time + axes.times[n])
-            for material in range(2):
-                maps.rings[material, n, ring] += energy[material] * share * inner_area
-                maps.rings[material, n, ring + 1] += energy[material] * share * outer_area
-    if axes.impulse_bins > 0 and time < axes.impulse_width * (axes.impulse_bins - 1):
-        bin_ = int(time / axes.impulse_width)
-        later = time / axes.impulse_width - bin_
-        for material in range(2):
-            early, late = energy[material] * (1.0 - later), energy[material] * later
-            maps.impulses[material, bin_, ring] += early * inner_area
-            maps.impulses[material, bin_, ring + 1] += early * outer_area
-            maps.impulses[material, bin_ + 1, ring] += late * inner_area
-            maps.impulses[material, bin_ + 1, ring + 1] += late * outer_area
+            share = gate_share(setup.gate, time + axes.times[n]) / cell
+            maps.late[0, n, row, column] += energy[0] * share
+            maps.late[1, n, row, column] += energy[1] * share
+    impulses = maps.late_impulses if touched else maps.impulses
+    ring, outer = ring_of(axes.radii, radius)
+    inner_area, outer_area = (1.0 - outer) / axes.ring_areas[ring], outer / axes.ring_areas[ring + 1]
+    moment = min((time - axes.impulse_start) / axes.impulse_width, axes.impulse_bins - 1.000001)
+    bin_ = int(max(moment, 0.0))
+    later = moment - bin_
+    for material in range(2):
+        early, late = energy[material] * (1.0 - later), energy[material] * later
+        impulses[material, bin_, ring] += early * inner_area
+        impulses[material, bin_, ring + 1] += early * outer_area
+        impulses[material, bin_ + 1, ring] += late * inner_area
+        impulses[material, bin_ + 1, ring + 1] += late * outer_area
+
+
+@device
+def empty_maps(axes: Any) -> Any:
+    """Return maps of no light."""
+    bins, rings = axes.impulse_bins, axes.radii.shape[0]
+    return LightMaps(
+        np.zeros((2, bins, rings)),
+        np.zeros((2, bins, rings)),
+        np.zeros((2, axes.times.shape[0], axes.cells, axes.cells)),
+    )
 
 
 @cached_kernel
-def light_walks(setup: Any, axes: MapAxes, latest: float, seed: Any, first: Any, count: int) -> LightMaps:
-    """Walk ``count`` packets and return the maps of scattered light on the target, summed.
+def light_walks(
+    setup: Any, axes: MapAxes, swung: int, latest: float, seed: Any, first: Any, count: int
+) -> Any:
+    """Walk ``count`` packets and return the `LightMaps` of scattered light on the target, summed.
 
     The unscattered light on the target is left out: it is computed. Walks therefore begin with a
     collision forced before the target, or (the share `REFLECTED_FIRST`) with a reflection. After every
     collision the chance of reaching the target unscattered is scored. A walk ends when it leaves, when
-    it can no longer land by ``latest`` (s), or by Russian roulette.
+    it can no longer land by ``latest`` (s), or by Russian roulette. Light that has not met the target is
+    left to `swung_walks` when it comes from up to ``swung`` collisions, all of them nearer to the start
+    than the landing.
     """
     water, target = setup.water, setup.target
-    rings, times = axes.radii.shape[0], axes.times.shape[0]
-    maps = LightMaps(
-        np.zeros((2, times, rings)),
-        np.zeros((2, times, axes.cells, axes.cells)),
-        np.zeros((2, axes.impulse_bins, rings)),
-    )
+    maps = empty_maps(axes)
     mean_free_path = 1.0 / max(water.attenuation, 1e-30)
     farthest = latest * water.group_velocity
     for i in range(count):
@@ -165,7 +171,8 @@ def light_walks(setup: Any, axes: MapAxes, latest: float, seed: Any, first: Any,
         way = target.distance / direction[2]
         through = math.exp(-water.attenuation * way)
         choice, u_free, u_scatter, u_azimuth = uniforms(seed, history, 1, LIGHT_STREAM)
-        path, touched = 0.0, False
+        start, path, touched, farthest_square = (x, y), 0.0, False, 0.0
+        collisions = 0
         at_target = choice < REFLECTED_FIRST
         if at_target:
             weight, free = through / REFLECTED_FIRST, way
@@ -187,6 +194,9 @@ def light_walks(setup: Any, axes: MapAxes, latest: float, seed: Any, first: Any,
                 touched = True
             else:
                 weight *= water.albedo
+                square = (x - start[0]) ** 2 + (y - start[1]) ** 2 + z * z
+                farthest_square = max(farthest_square, square)
+                collisions += 1
                 angle = 2.0 * math.pi * u_azimuth
                 deviation = sample_deviation(setup.phase, u_scatter)
                 direction = turn(direction, deviation, math.sin(angle), math.cos(angle))
@@ -204,8 +214,10 @@ def light_walks(setup: Any, axes: MapAxes, latest: float, seed: Any, first: Any,
                 figure = arriving_weight * diffuse_albedo(target.figure, direction[2])
                 ground = arriving_weight * diffuse_albedo(target.ground, direction[2])
                 place = (x + way * direction[0], y + way * direction[1])
-                time = (path + way) / water.group_velocity
-                _score(setup, axes, maps, touched, place, (figure, ground), time)
+                ball = (place[0] - start[0]) ** 2 + (place[1] - start[1]) ** 2 + target.distance**2
+                if touched or collisions > swung or farthest_square >= ball:
+                    time = (path + way) / water.group_velocity
+                    score(setup, axes, maps, touched, place, (figure, ground), time)
             elif direction[2] < 0.0:
                 way = -z / direction[2]
                 if path + (target.distance - z) > farthest:

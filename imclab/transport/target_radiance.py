@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from imclab.transport.direct_light import DirectLight
 from imclab.transport.gathering import gate_share
 from imclab.transport.kernel_cache import cached_kernel
-from imclab.transport.light_walk import LightMaps, MapAxes, ring_of
+from imclab.transport.light_walk import MapAxes, ring_of
 from imclab.transport.setup import Setup
 
 FloatArray = NDArray[np.float64]
@@ -22,6 +22,7 @@ TABLE_STEPS_PER_SIGMA = 64.0
 RINGS_PER_BEAM = 48.0
 RING_GROWTH = 0.03
 COARSE_CELLS = 24
+MOST_IMPULSE_BINS = 2000
 
 
 def map_axes(setup: Setup, latest: float) -> MapAxes:
@@ -39,10 +40,24 @@ def map_axes(setup: Setup, latest: float) -> MapAxes:
     while radii[-1] <= corner:
         radii.append(radii[-1] + max(finest, RING_GROWTH * radii[-1]))
     radius = np.array(radii)
-    last = setup.time.start + setup.time.width * setup.time.bins
-    bins = math.ceil(last / setup.time.width) + 2 if setup.time.bins else 0
     times = _camera_times(setup, latest)
-    return MapAxes(radius, _tent_areas(radius), times, COARSE_CELLS, setup.time.width, max(bins, 0))
+    return MapAxes(radius, _tent_areas(radius), times, COARSE_CELLS, *_impulse_axis(setup, latest))
+
+
+def _impulse_axis(setup: Setup, latest: float) -> tuple[float, float, int]:
+    """Return start, step and number of the times of arrival on the target.
+
+    As fine as gate and histogram want; without either all light is at one time.
+    """
+    start = setup.target.distance / setup.water.group_velocity
+    end, step = latest, setup.gate.sigma / STEPS_PER_SIGMA
+    if setup.time.bins:
+        end = setup.time.start + setup.time.width * setup.time.bins
+        step = min(step, setup.time.width) if math.isfinite(latest) else setup.time.width
+    if not math.isfinite(end) or end <= start:
+        return start, 1e30, 2
+    step = max(step, (end - start) / MOST_IMPULSE_BINS)
+    return start, step, math.ceil((end - start) / step) + 2
 
 
 def _tent_areas(radius: FloatArray) -> FloatArray:
@@ -75,6 +90,15 @@ def _covered(first: float, growth: float) -> float:
     return first * steps if growth == 1.0 else first * (growth**steps - 1.0) / (growth - 1.0)
 
 
+def gate_matrix(setup: Setup, axes: MapAxes) -> FloatArray:
+    """Return the gate's share (times, impulse bins) of light on the target, for each camera time."""
+    if not math.isfinite(setup.gate.opens):
+        return np.ones((axes.times.size, axes.impulse_bins))
+    arrival = axes.impulse_start + axes.impulse_width * np.arange(axes.impulse_bins)
+    total = (axes.times[:, None] + arrival[None, :]).ravel()
+    return np.asarray(_shares_at(setup, total).reshape(axes.times.size, axes.impulse_bins))
+
+
 def gate_table(setup: Setup, axes: MapAxes, direct: DirectLight) -> tuple[float, float, FloatArray]:
     """Return start, step and shares of the gate, tabulated over all arrivals of direct light."""
     if not math.isfinite(setup.gate.opens):
@@ -82,25 +106,26 @@ def gate_table(setup: Setup, axes: MapAxes, direct: DirectLight) -> tuple[float,
     step = setup.gate.sigma / TABLE_STEPS_PER_SIGMA
     start = float(direct.time.min() + axes.times[0]) - step
     count = int((direct.time.max() + axes.times[-1] - start) / step) + 3
-    return start, step, _shares(setup, start, step, count)
+    return start, step, _shares_at(setup, start + step * np.arange(count))
 
 
 @cached_kernel
-def _shares(setup: Any, start: float, step: float, count: int) -> Any:
-    shares = np.empty(count)
-    for i in range(count):
-        shares[i] = gate_share(setup.gate, start + i * step)
+def _shares_at(setup: Any, arrivals: Any) -> Any:
+    shares = np.empty(arrivals.shape[0])
+    for i in range(arrivals.shape[0]):
+        shares[i] = gate_share(setup.gate, arrivals[i])
     return shares
 
 
 @cached_kernel
 def gated_radiance(
-    setup: Any, axes: MapAxes, table: Any, direct: DirectLight, coverage: Any, maps: LightMaps
+    setup: Any, axes: MapAxes, table: Any, direct: DirectLight, coverage: Any, rings: Any, late: Any
 ) -> Any:
     """Return the gated radiance (times, rows, columns), float32, and the picture of scattered light.
 
-    ``table`` is that of `gate_table`; ``maps`` are means per packet; the picture is of light scattered
-    on its way to the target and seen unscattered.
+    ``table`` is that of `gate_table`; ``rings`` (2, times, rings) and ``late`` (2, times, cells, cells)
+    are the gated light on the target per packet; the picture is of light scattered on its way to the
+    target and seen unscattered.
     """
     rows, columns = coverage.shape
     target, times = setup.target, axes.times
@@ -122,13 +147,13 @@ def gated_radiance(
             for n in range(times.shape[0]):
                 previous = scattered
                 scattered = figure * (
-                    (1.0 - outer) * maps.rings[0, n, ring]
-                    + outer * maps.rings[0, n, ring + 1]
-                    + maps.grid[0, n, coarse_row, coarse_column]
+                    (1.0 - outer) * rings[0, n, ring]
+                    + outer * rings[0, n, ring + 1]
+                    + late[0, n, coarse_row, coarse_column]
                 ) + ground * (
-                    (1.0 - outer) * maps.rings[1, n, ring]
-                    + outer * maps.rings[1, n, ring + 1]
-                    + maps.grid[1, n, coarse_row, coarse_column]
+                    (1.0 - outer) * rings[1, n, ring]
+                    + outer * rings[1, n, ring + 1]
+                    + late[1, n, coarse_row, coarse_column]
                 )
                 share = 1.0
                 if shares.shape[0] > 0:

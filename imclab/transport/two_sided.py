@@ -24,20 +24,36 @@ from imclab.transport.backscatter_walk import backscatter_walks, peak_angle
 from imclab.transport.camera_walk import camera_walks
 from imclab.transport.direct_light import coverage_of, direct_light, rules_for
 from imclab.transport.expected import glossy_share, left_out
-from imclab.transport.light_walk import LightMaps, light_walks
+from imclab.transport.light_walk import LightMaps, MapAxes, light_walks
 from imclab.transport.next_event import mirror_light, next_event_walks
 from imclab.transport.picture_grid import picture_grid
 from imclab.transport.runner import Estimator, Tally
 from imclab.transport.setup import PULSE_REACH, Setup
 from imclab.transport.smooth_map import smooth_map
-from imclab.transport.target_radiance import gate_table, gated_radiance, map_axes
+from imclab.transport.swung_walk import collisions_swung, swung_walks
+from imclab.transport.target_radiance import gate_matrix, gate_table, gated_radiance, map_axes
 from imclab.transport.two_sided_times import rings_seen, scattered_times
 
 FloatArray = NDArray[np.float64]
 
 BATCH_SIZE = 20_000
+WALKS_SWUNG_PER_OTHER = 4
 ROW_STEP = 4
 """A camera walk serves every fourth row: adding to fewer pixels leaves time for more walks."""
+
+
+def light_maps(
+    setup: Setup, axes: MapAxes, swung: int, latest: float, run: tuple[np.uint64, np.uint64, int]
+) -> LightMaps:
+    """Return the maps of scattered light on the target per packet, from walks of both kinds."""
+    seed, first, count = run
+    if not swung:
+        return LightMaps(*(part / max(count, 1) for part in light_walks(setup, axes, 0, latest, *run)))
+    few = -(-count // WALKS_SWUNG_PER_OTHER)
+    others = light_walks(setup, axes, swung, latest, seed, first, few)
+    swings = swung_walks(setup, axes, latest, *run)
+    pairs = zip(swings, others, strict=True)
+    return LightMaps(*(a / max(count, 1) + b / max(few, 1) for a, b in pairs))
 
 
 def make(setup: Setup) -> Estimator:
@@ -50,7 +66,9 @@ def make(setup: Setup) -> Estimator:
     exact = {"target": grid.pixels(direct.picture), "backscatter": np.zeros(grid.shape)}
     if setup.time.bins:
         exact["time"] = direct.times
+    swung = collisions_swung(setup)
     table, peak, glossy = gate_table(setup, axes, direct), peak_angle(setup), glossy_share(setup, grid)
+    shares = gate_matrix(setup, axes)
     unscattered = rings_seen(setup, axes, direct, coverage)
     scatters, shiny = setup.water.scattering > 0.0, bool(glossy.any())
     diffuse = {setup.target.figure.kind, setup.target.ground.kind} != {MICROFACET}
@@ -60,14 +78,15 @@ def make(setup: Setup) -> Estimator:
         pictures, times = np.zeros((2, *grid.shape)), np.zeros(setup.time.bins)
         run = (np.uint64(seed), np.uint64(first_history), count)
         if scatters and diffuse:
-            sums = light_walks(setup, axes, latest, *run)
-            maps = LightMaps(*(array / max(count, 1) for array in sums))
-            radiance, seen = gated_radiance(setup, axes, table, direct, coverage, maps)
+            maps = light_maps(setup, axes, swung, latest, run)
+            rings = shares @ maps.impulses
+            radiance, seen = gated_radiance(setup, axes, table, direct, coverage, rings, maps.late)
             camera = camera_walks(setup, axes, direct, coverage, radiance, ROW_STEP, *run)
             cells = count * seen + camera.picture
             if setup.time.bins:
-                rings = unscattered + camera.impulses / max(count, 1)
-                times += camera.times + count * scattered_times(setup, axes, maps.impulses, rings)
+                seen_rings = unscattered + camera.impulses / max(count, 1)
+                arriving = maps.impulses + maps.late_impulses
+                times += camera.times + count * scattered_times(setup, axes, arriving, seen_rings)
         if scatters:
             backscatter_walks(setup, peak, latest, veil.tents, *run, backscatter, times)
         if scatters and shiny:

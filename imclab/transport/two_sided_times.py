@@ -21,7 +21,8 @@ def scattered_times(setup: Setup, axes: MapAxes, arriving: FloatArray, seen: Flo
     from scipy.signal import fftconvolve
 
     both = fftconvolve(arriving, seen, axes=1).sum(axis=(0, 2))
-    place = (np.arange(both.size) * axes.impulse_width - setup.time.start) / setup.time.width - 0.5
+    moment = axes.impulse_start + axes.times[0] + np.arange(both.size) * axes.impulse_width
+    place = (moment - setup.time.start) / setup.time.width - 0.5
     low = np.floor(place).astype(np.int64)
     times = np.zeros(setup.time.bins)
     for bins, share in ((low, low + 1.0 - place), (low + 1, place - low)):
@@ -33,7 +34,7 @@ def scattered_times(setup: Setup, axes: MapAxes, arriving: FloatArray, seen: Flo
 def rings_seen(setup: Setup, axes: MapAxes, direct: DirectLight, coverage: FloatArray) -> FloatArray:
     """Return what the camera sees of each ring unscattered, laid out as `CameraTally.impulses`."""
     seen = np.zeros((2, axes.impulse_bins, axes.radii.size))
-    if not axes.impulse_bins:
+    if not setup.time.bins:
         return seen
     rows, columns = coverage.shape
     y = (2.0 * (np.arange(rows) + 0.5) / rows - 1.0) * setup.target.half_height
@@ -41,7 +42,7 @@ def rings_seen(setup: Setup, axes: MapAxes, direct: DirectLight, coverage: Float
     radius = np.hypot(x[None, :], y[:, None])
     ring = np.searchsorted(axes.radii, radius, side="right") - 1
     outer = (radius - axes.radii[ring]) / np.diff(axes.radii)[ring]
-    place = direct.return_time / axes.impulse_width
+    place = (direct.return_time - axes.times[0]) / axes.impulse_width
     bin_ = np.floor(place).astype(np.int64)
     later = place - bin_
     known = bin_ < axes.impulse_bins - 1
