@@ -55,7 +55,15 @@ def _one_kind_of_failure(name: str, doing: str) -> Iterator[None]:
         yield
     except LinkError:
         raise
-    except (serial.SerialException, OSError, termios.error, ValueError, AttributeError, TypeError) as error:
+    except (
+        serial.SerialException,
+        OSError,
+        termios.error,
+        ValueError,
+        AttributeError,
+        TypeError,
+        NotImplementedError,
+    ) as error:
         # pyserial raises TypeError or AttributeError when a port is closed under its feet.
         reason = str(error) or type(error).__name__
         raise LinkError(
@@ -84,9 +92,11 @@ class SerialLink:
         """Open the port; nothing is sent."""
         import serial
 
+        # pyserial's rfc2217 knows no write time-out and refuses to open with one.
+        write_timeout = None if self.name.startswith("rfc2217:") else _WRITE_TIMEOUT_S
         with _one_kind_of_failure(self.name, "opening"):
             self._port = serial.serial_for_url(
-                self.name, baudrate=self.baud, timeout=_SLICE_S, write_timeout=_WRITE_TIMEOUT_S
+                self.name, baudrate=self.baud, timeout=_SLICE_S, write_timeout=write_timeout
             )
 
     def now(self) -> float:

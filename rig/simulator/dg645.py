@@ -18,7 +18,7 @@ from rig.simulator.dg645_values import (
     LEVELS,
     LONGEST_PS,
     NUMBERS,
-    STEP_PS,
+    STEPPED,
     TIME,
     Refusal,
     Settings,
@@ -29,7 +29,6 @@ from rig.simulator.dg645_values import (
 from rig.simulator.edges import Edge, PulseOutput
 
 _COMMAND = re.compile(r"(\*[A-Za-z]{3}|[A-Za-z]{4})(\??)\s*(.*)")
-_STEP_NAMES = ("HD", "PH", "PS", "TL", "TR", "BC", "BD", "BP", "DL", "LA", "LO")
 _INTERFACE = {0: 1, 1: 9600, 2: 1, 3: 15, 4: 1, 5: 1, 6: 1, 7: 1, 8: 1, 9: 1, 10: 1}
 _CYCLE_PS = 100_000  # beyond the longest delay, before the next trigger
 
@@ -153,8 +152,8 @@ class SimulatedDG645:
         table |= dict.fromkeys(NUMBERS, self._number)
         table |= dict.fromkeys(LEVELS, self._level)
         table |= dict.fromkeys(("*ESE", "*SRE", "*PSC", "INSE"), self._register)
-        table |= {f"SS{name}": self._step_size for name in _STEP_NAMES}
-        table |= {f"SP{name}": self._step for name in _STEP_NAMES}
+        table |= {f"SS{name}": self._step_size for name in STEPPED}
+        table |= {f"SP{name}": self._step for name in STEPPED}
         table |= {
             "*IDN": self._asked(lambda: f"Stanford Research Systems,DG645,s/n{self.serial},ver1.14.10E"),
             "LERR": self._asked(lambda: str(self.status.next_error())),
@@ -170,10 +169,7 @@ class SimulatedDG645:
             "*RST": self._told(lambda: self._replace(Settings())),
             "*CLS": self._told(self.status.clear),
             "*TRG": self._told(self._single_shot),
-            **{
-                name: self._told(lambda: None)
-                for name in ("*WAI", "REMT", "LCAL", "IFRS", "SHDP", "XTRM", "EPHY")
-            },
+            **{name: self._told(lambda: None) for name in ("*WAI", "REMT", "LCAL", "IFRS", "XTRM", "EPHY")},
             "*OPC": lambda name, query, arguments: "1" if query else None,
         }
         return table
@@ -327,17 +323,17 @@ class SimulatedDG645:
         return None
 
     def _step_size(self, name: str, query: bool, arguments: list[str]) -> str | None:
-        key = name[2:] + ("," + arguments[0] if len(arguments) > (0 if query else 1) else "")
+        key = ",".join([name[2:], *(arguments if query else arguments[:-1])])
         if query:
-            return str(self.settings.steps.get(key, 1))
-        self.settings.steps[key] = TIME.read(arguments[-1])
+            return f"{self.settings.steps.get(key, Decimal(1)):f}"
+        self.settings.steps[key] = Decimal(ANY_DELAY.read(arguments[-1])) / 10**12
         return None
 
     def _step(self, name: str, query: bool, arguments: list[str]) -> None:
-        if name != "SPDL":
-            raise Refusal(11)
-        check_count(arguments, 2)
-        edge, up = index(arguments[0], 9), index(arguments[1], 1)
-        reference, after = self.settings.delays[edge]
-        size = self.settings.steps.get(f"DL,{edge}", STEP_PS)
-        self._hang(edge, reference, after + (size if up else -size))
+        """Move a setting by its step: what ``?`` answers, and a set, both of its own command."""
+        *place, way = arguments or ["", ""]
+        size = self.settings.steps.get(",".join([name[2:], *place]), Decimal(1))
+        command = STEPPED[name[2:]]
+        *reference, value = (self._run(f"{command}?{','.join(place)}") or "").split(",")
+        moved = Decimal(value) + (size if index(way, 1) else -size)
+        self._run(f"{command}{','.join([*place, *reference, f'{moved:f}'])}")

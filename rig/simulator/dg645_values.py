@@ -37,10 +37,10 @@ class Settings:
     numbers: dict[str, int] = field(
         default_factory=lambda: {
             "TSRC": 5, "TRAT": 1_000_000_000, "TLVL": 1000, "ADVT": 0, "HOLD": 0, "INHB": 1, "BURM": 0,
-            "BURC": 5, "BURP": 100_000_000, "BURD": 0, "BURT": 0,
+            "BURC": 5, "BURP": 100_000_000, "BURD": 0, "BURT": 0, "SHDP": 1,
         }
     )  # fmt: skip
-    steps: dict[str, int] = field(default_factory=dict)
+    steps: dict[str, Decimal] = field(default_factory=dict)
     display: tuple[int, int] = (11, 2)
 
 
@@ -80,7 +80,7 @@ def whole(lowest: int, highest: int) -> Number:
 
 TIME = Number(_PS, STEP_PS, 0, LONGEST_PS, 12)
 ANY_DELAY = Number(_PS, STEP_PS, -LONGEST_PS, LONGEST_PS, 12)
-_CHOICES = {"TSRC": 6, "ADVT": 1, "INHB": 5, "BURM": 1, "BURT": 1}
+_CHOICES = {"TSRC": 6, "ADVT": 1, "INHB": 5, "BURM": 1, "BURT": 1, "SHDP": 1}
 NUMBERS = {
     "TRAT": Number(Decimal(10) ** 6, 1, 100, 10**13, 6),
     "TLVL": Number(Decimal(1000), 10, -3500, 3500, 2),
@@ -110,3 +110,10 @@ def index(text: str, highest: int) -> int:
     if not 0 <= int(text) <= highest:
         raise Refusal(10)
     return int(text)
+
+
+STEPPED = {
+    "HD": "HOLD", "PH": "PHAS", "PS": "PRES", "TL": "TLVL", "TR": "TRAT", "BC": "BURC", "BD": "BURD",
+    "BP": "BURP", "DL": "DLAY", "LA": "LAMP", "LO": "LOFF",
+}  # fmt: skip
+"""What SSxx and SPxx step, by their last two letters."""

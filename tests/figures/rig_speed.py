@@ -5,11 +5,37 @@ Run with ``python -m tests.figures.rig_speed``; about a minute, nearly all of it
 
 from __future__ import annotations
 
+import contextlib
+import json
+import subprocess
+import sys
 import time
+from collections.abc import Iterator
 from fractions import Fraction
 from statistics import median
 
 import rig
+
+
+@contextlib.contextmanager
+def simulated(model: str, baud: int) -> Iterator[str]:
+    """Run a paced simulated generator in a process of its own, and give its address."""
+    words = [
+        sys.executable,
+        "-m",
+        "imclab",
+        "gate",
+        "simulate",
+        "--model",
+        model,
+        "--baud",
+        str(baud),
+        "--json",
+    ]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        yield json.loads(process.stdout.readline())["url"]
+        process.terminate()
 
 
 def wire_seconds(sent: int, received: int, baud: int) -> float:
@@ -21,8 +47,8 @@ def verified_set(model: str, baud: int) -> tuple[float, float]:
     """Median seconds of a verified delay, and the wire's share."""
     seconds = []
     with (
-        rig.simulate(model, baud=baud) as simulated,
-        rig.open_generator(simulated.url, model=model, baud=baud) as box,
+        simulated(model, baud) as url,
+        rig.open_generator(url, model=model, baud=baud) as box,
     ):
         step = box.dialect.model.step_ps
         box.apply(rig.plan_gate("40 m", model=model))
@@ -53,8 +79,8 @@ def scan_of_200(model: str, baud: int, *, grab: bool) -> float:
     plan = rig.plan_gate("40 m", model=model)
     sweep = rig.plan_scan(plan, start="38 m", stop="42 m", points=200)
     with (
-        rig.simulate(model, baud=baud) as simulated,
-        rig.open_generator(simulated.url, model=model, baud=baud, limits=limits) as box,
+        simulated(model, baud) as url,
+        rig.open_generator(url, model=model, baud=baud, limits=limits) as box,
     ):
         begin = time.perf_counter()
         steps = list(rig.run_scan(box, sweep, grab=(lambda step: 1.0) if grab else None))
