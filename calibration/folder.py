@@ -76,7 +76,8 @@ def read_folder(folder: str | Path, *, pattern: str | None = None) -> Series:
     """
     root = Path(folder)
     if not root.is_dir():
-        raise FolderError(str(root), [Fault("folder", "no such folder", "a folder of calibration frames")])
+        came = "a file" if root.exists() else "no such folder"
+        raise FolderError(str(root), [Fault("folder", came, "a folder of calibration frames")])
     setup, faults = read_setup(root / SETUP)
     if pattern is None:
         records, notes, table_faults = _read_table(root / TABLE)

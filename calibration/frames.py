@@ -7,8 +7,10 @@ one picture in memory.
 from __future__ import annotations
 
 import hashlib
+import logging
 import struct
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -67,7 +69,7 @@ def _inspect_tiff(path: Path) -> FrameInfo:
 
     size = path.stat().st_size
     try:
-        with tifffile.TiffFile(path) as tiff:
+        with _quiet_tifffile(), tifffile.TiffFile(path) as tiff:
             series = tiff.series[0]
             shape, dtype = tuple(series.shape), np.dtype(series.dtype)
             ends = [
@@ -91,6 +93,17 @@ def _inspect_tiff(path: Path) -> FrameInfo:
     return FrameInfo((int(shape[-2]), int(shape[-1])), int(shape[0]) if len(shape) == 3 else 1, dtype)
 
 
+@contextmanager
+def _quiet_tifffile() -> Iterator[None]:
+    """Keep tifffile from writing to the log what an error says better here."""
+    logger = logging.getLogger("tifffile")
+    before, logger.disabled = logger.disabled, True
+    try:
+        yield
+    finally:
+        logger.disabled = before
+
+
 def pictures(path: Path) -> Iterator[NDArray[np.generic]]:
     """Yield the pictures of a frame file one after the other, each (rows, columns).
 
@@ -105,7 +118,7 @@ def pictures(path: Path) -> Iterator[NDArray[np.generic]]:
     import tifffile
 
     try:
-        with tifffile.TiffFile(path) as tiff:
+        with _quiet_tifffile(), tifffile.TiffFile(path) as tiff:
             series = tiff.series[0]
             if series.dataoffset is not None:
                 # Uncompressed and in one piece: mapped, so that a long stack is never in memory whole.

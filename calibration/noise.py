@@ -119,10 +119,12 @@ def _spread(points: TransferPoints) -> tuple[Floats, float, float]:
     sums = np.array([correlation[ring == radius].sum() for radius in range(reach + 1)])
     # Each lag and its mirror image are one and the same number, hence the factor 2.
     errors = one_lag * np.sqrt(2.0 * np.array([np.sum(ring == radius) for radius in range(reach + 1)]))
-    significant = np.flatnonzero(np.abs(sums[1:]) > 2.5 * errors[1:]) + 1
-    last = int(significant.max()) if significant.size else 0
+    # A spread event shares its noise with all rings out to where it ends: the first ring that shows
+    # nothing ends the sum, or chance far out would enter it.
+    silent = np.flatnonzero(sums[1:] < 3.0 * errors[1:])
+    last = int(silent[0]) if silent.size else reach
     kept = np.where(ring <= last, correlation, 0.0)
-    error = float(np.sqrt((errors[1 : last + 1] ** 2).sum() + errors[min(last + 1, reach)] ** 2 / 16.0))
+    error = float(np.sqrt((errors[1 : last + 1] ** 2).sum() + errors[min(last + 1, reach)] ** 2 / 4.0))
     return kept, max(float(kept.sum()), 1e-3), error
 
 

@@ -25,6 +25,8 @@ VERSION = 1
 
 def save(camera: Calibration, path: Path) -> None:
     """Write ``camera`` to ``path`` under a temporary name, then put it in place."""
+    if not path.parent.is_dir():
+        raise StoredFileError(f"{path}: the folder {path.parent} does not exist. Make it, or name another.")
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         with h5py.File(temporary, "w") as file:

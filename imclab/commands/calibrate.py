@@ -28,8 +28,12 @@ def calibrate(
 ) -> None:
     """Calibrate the camera: response, intensifier gain, noise, pixel maps, with uncertainties."""
     import calibration
+    from imclab.errors import Fault, InputError
     from imclab.report.calibration_page import summary, write_page
 
+    if not output.parent.is_dir():
+        wanted = "a file in a folder that exists"
+        raise InputError("calibrate", [Fault("--output", f"{output}, whose folder does not exist", wanted)])
     progress = Progress()
     try:
         camera = calibration.calibrate(folder, pattern=pattern, progress=progress)

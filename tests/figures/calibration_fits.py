@@ -197,7 +197,7 @@ def _scene_once(rng: np.random.Generator, noise: float) -> tuple[float, float]:
         )
         for t in times
     ]
-    curve = cv2.createCalibrateDebevec(70, 10.0).process(images, times.astype(np.float32))[:, 0, 0]
+    curve = cv2.createCalibrateDebevec(70, 10.0).process(images, times.astype(np.float32)).ravel()
     grey = np.arange(13, 243)
     true = np.log(-np.log1p(-((grey / 255.0) ** (1 / 0.7))))
     picked = rng.choice(radiance.size, 70, replace=False)
