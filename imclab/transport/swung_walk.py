@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from imclab.transport.kernel_cache import cached_kernel, device
-from imclab.transport.light_walk import LightMaps, MapAxes, diffuse_albedo, empty_maps, score
+from imclab.transport.light_walk import MapAxes, diffuse_albedo, empty_maps, score
 from imclab.transport.random import uniforms
 from imclab.transport.scattering import sample_deviation, turn
 from imclab.transport.setup import Setup

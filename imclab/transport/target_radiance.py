@@ -132,39 +132,46 @@ def gated_radiance(
     start, step, shares = table
     radiance = np.empty((times.shape[0], rows, columns), dtype=np.float32)
     picture = np.zeros((rows, columns))
+    ring, outer = np.empty(columns, dtype=np.int64), np.empty(columns)
+    figure, ground = np.empty(columns), np.empty(columns)
+    straight, place = np.empty(columns), np.empty(columns)
+    scattered, previous = np.empty(columns), np.empty(columns)
+    last_seen = np.searchsorted(times, direct.return_time.max()) + 1
     for row in range(rows):
         y = (2.0 * (row + 0.5) / rows - 1.0) * target.half_height
         coarse_row = int((row + 0.5) / rows * axes.cells)
         for column in range(columns):
             x = (2.0 * (column + 0.5) / columns - 1.0) * target.half_width
-            coarse_column = int((column + 0.5) / columns * axes.cells)
-            ring, outer = ring_of(axes.radii, math.sqrt(x * x + y * y))
-            figure = coverage[row, column] / math.pi
-            ground = (1.0 - coverage[row, column]) / math.pi
-            straight = figure * direct.lit[0, row, column] + ground * direct.lit[1, row, column]
-            wanted = direct.return_time[row, column]
-            scattered = seen = 0.0
-            for n in range(times.shape[0]):
-                previous = scattered
-                scattered = figure * (
-                    (1.0 - outer) * rings[0, n, ring]
-                    + outer * rings[0, n, ring + 1]
-                    + late[0, n, coarse_row, coarse_column]
-                ) + ground * (
-                    (1.0 - outer) * rings[1, n, ring]
-                    + outer * rings[1, n, ring + 1]
-                    + late[1, n, coarse_row, coarse_column]
-                )
+            ring[column], outer[column] = ring_of(axes.radii, math.sqrt(x * x + y * y))
+            figure[column] = coverage[row, column] / math.pi
+            ground[column] = (1.0 - coverage[row, column]) / math.pi
+            straight[column] = figure[column] * direct.lit[0, row, column]
+            straight[column] += ground[column] * direct.lit[1, row, column]
+            scattered[column] = previous[column] = 0.0
+        for n in range(times.shape[0]):
+            for column in range(columns):
+                coarse_column = int((column + 0.5) / columns * axes.cells)
+                inner, outside = ring[column], outer[column]
+                on_figure = rings[0, n, inner] + outside * (rings[0, n, inner + 1] - rings[0, n, inner])
+                on_ground = rings[1, n, inner] + outside * (rings[1, n, inner + 1] - rings[1, n, inner])
+                on_figure += late[0, n, coarse_row, coarse_column]
+                on_ground += late[1, n, coarse_row, coarse_column]
+                place[column] = figure[column] * on_figure + ground[column] * on_ground
+            for column in range(columns):
                 share = 1.0
                 if shares.shape[0] > 0:
-                    place = (direct.time[row, column] + times[n] - start) / step
-                    index = int(place)
-                    share = shares[index] + (place - index) * (shares[index + 1] - shares[index])
-                radiance[n, row, column] = straight * share + scattered
-                if n == 0:
-                    seen = scattered
-                elif times[n - 1] <= wanted:
-                    later = (wanted - times[n - 1]) / (times[n] - times[n - 1])
-                    seen = previous + min(later, 1.0) * (scattered - previous)
-            picture[row, column] = seen * direct.reach[row, column]
+                    moment = (direct.time[row, column] + times[n] - start) / step
+                    index = int(moment)
+                    share = shares[index] + (moment - index) * (shares[index + 1] - shares[index])
+                radiance[n, row, column] = straight[column] * share + place[column]
+            if n <= last_seen:
+                before, width = times[max(n - 1, 0)], times[n] - times[max(n - 1, 0)]
+                for column in range(columns):
+                    later = 1.0
+                    if n > 0:
+                        later = min(max((direct.return_time[row, column] - before) / width, 0.0), 1.0)
+                    scattered[column] += later * (place[column] - previous[column])
+                    previous[column] = place[column]
+        for column in range(columns):
+            picture[row, column] = scattered[column] * direct.reach[row, column]
     return radiance, picture

@@ -70,6 +70,7 @@ def make(setup: Setup) -> Estimator:
     table, peak, glossy = gate_table(setup, axes, direct), peak_angle(setup), glossy_share(setup, grid)
     shares = gate_matrix(setup, axes)
     unscattered = rings_seen(setup, axes, direct, coverage)
+    veil_every = 2 if np.isfinite(latest) else 1  # a gate leaves little backscatter
     scatters, shiny = setup.water.scattering > 0.0, bool(glossy.any())
     diffuse = {setup.target.figure.kind, setup.target.ground.kind} != {MICROFACET}
 
@@ -88,7 +89,10 @@ def make(setup: Setup) -> Estimator:
                 arriving = maps.impulses + maps.late_impulses
                 times += camera.times + count * scattered_times(setup, axes, arriving, seen_rings)
         if scatters:
-            backscatter_walks(setup, peak, latest, veil.tents, *run, backscatter, times)
+            few, veiled = -(-count // veil_every), np.zeros(setup.time.bins)
+            backscatter_walks(setup, peak, latest, veil.tents, *run[:2], few, backscatter, veiled)
+            backscatter *= count / max(few, 1)
+            times += veiled * (count / max(few, 1))
         if scatters and shiny:
             next_event_walks(setup, True, latest, *run, pictures, times)
         if shiny:
