@@ -99,22 +99,28 @@ def _of_setting(evidence: Evidence, index: int) -> list[Figure]:
         ),
         figure("read noise (rounding taken off)", read, read_stderr, "DN"),
     ]
-    frames = dark.statistics.frames
-    pattern, pattern_stderr = fixed_pattern(
-        dark.picture[good], noise_of_mean=math.sqrt(transfer.read_variance / frames)
-    )
-    figures.append(figure("DSNU", pattern, pattern_stderr, "DN"))
-    if gain in evidence.flats:
-        field = evidence.flats[gain].run.statistics
-        noise = math.sqrt(max(field.variance, 0.0) / field.frames) if math.isfinite(field.variance) else 0.0
-        pattern, pattern_stderr = fixed_pattern(evidence.flats[gain].picture[good], noise_of_mean=noise)
-        figures.append(figure("PRNU", pattern / field.mean, pattern_stderr / field.mean, "1"))
+    figures += _fixed_patterns(evidence, gain, transfer)
     top = float(evidence.response.table[1][-1])
     if transfer.shot > 0.0:
         events = top / (transfer.shot * transfer.spread)
         error = math.hypot(relative, transfer.spread_stderr / transfer.spread)
         figures.append(figure("events at the top of the range", events, events * error, "events"))
         figures += _detection_limit(evidence, index, top)
+    return figures
+
+
+def _fixed_patterns(evidence: Evidence, gain: float, transfer: Transfer) -> list[Figure]:
+    """DSNU of the dark frames and PRNU of the flat frames, temporal noise taken off."""
+    good = evidence.defects == 0
+    dark = evidence.darks[gain]
+    noise = math.sqrt(transfer.read_variance / dark.statistics.frames)
+    value, stderr = fixed_pattern(dark.picture[good], noise_of_mean=noise)
+    figures = [Figure("DSNU", gain, value, stderr, 0.0, "DN")]
+    if gain in evidence.flats:
+        flat = evidence.flats[gain]
+        level = flat.run.statistics.mean
+        value, stderr = fixed_pattern(flat.picture[good], noise_of_mean=flat.relative_noise * level)
+        figures.append(Figure("PRNU", gain, value / level, stderr / level, 0.0, "1"))
     return figures
 
 

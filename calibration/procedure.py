@@ -6,10 +6,10 @@ import datetime
 import math
 import platform
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from functools import partial
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,18 +20,16 @@ from calibration.folder import Series, read_folder
 from calibration.levels import Levels
 from calibration.merit import Evidence, figures_of_merit, linearity_error
 from calibration.model import Calibration
-from calibration.noise import Transfer, TransferPoints, fit_transfer
+from calibration.noise import Transfer
 from calibration.reader import Progress, Reader
-from calibration.response import JointFit, fit_jointly, rising
+from calibration.response import JointFit, fit_jointly
 from calibration.runs import Run, clipped, faults_of_runs, levels_of, reference_of, saturation_of, usable
 from calibration.setting import Setting
 from calibration.stages import DarkField, FlatField, dark_fields, flat_fields, light_runs
-from calibration.tally import LAG_REACH
+from calibration.transfer import transfers_of
 
 Floats = NDArray[np.float64]
 
-RESPONSE_DRAWS = 24
-BENT_NOISE = 8e-3  # relative: what photon transfer is off by through a bent response (measured)
 RANGE_SIGMAS = 4.0  # how far the noise of the brightest level reaches: counts seen, not extrapolated
 OUTLIER_SIGMAS = 5.0
 
@@ -73,28 +71,18 @@ def calibrate(
     if progress:
         progress("solving response, gain and noise")
     good = defects == 0
-    lowest_dark = min(float(np.median(field.picture[good])) for field in darks.values())
-    dark_variance = {gain: field.statistics.variance for gain, field in darks.items()}
-    fit, used = _fit_without_outliers(
-        usable(runs, saturation),
-        lambda chosen: levels_of(
-            chosen, series, dark_variance=dark_variance, saturation_above_dark=saturation - lowest_dark
-        ),
-        reader,
-    )
-    straightened = {run.where: run for run in used}
-    runs = [straightened.get(run.where, run) for run in runs]
-    response = _response(fit, used, saturation - lowest_dark)
+    solved = _solve(runs, darks, reader, saturation=saturation, good=good)
+    fit, response = solved.fit, solved.response
     flat_maps = {gain: _sensitivity(field, response, typical, good) for gain, field in flats.items()}
-    transfers, systematic = _transfers(series, runs, darks, fit, response, saturation, reader)
-    reference = reference_of(used, series)
-    nodes = fit.log_counts.size
+    transfers, systematic = transfers_of(
+        solved.runs, darks, reader, fit=fit, response=response, saturation=saturation
+    )
     evidence = Evidence(
         setup=series.setup,
         response=response,
         gains=series.settings,
         log_gain=fit.log_gain,
-        log_gain_stderr=np.sqrt(np.diag(fit.covariance)[nodes:]).tolist(),
+        log_gain_stderr=np.sqrt(np.diag(fit.covariance)[fit.log_counts.size :]).tolist(),
         transfers=transfers,
         shot_systematic=systematic,
         darks=darks,
@@ -102,13 +90,13 @@ def calibrate(
         defects=defects,
         saturation_counts=saturation,
         energy_in_joule=series.energy_unit == "J",
-        linearity=_linearity(used, reference),
+        linearity=_linearity(solved.used, solved.reference),
     )
     return Calibration(
         setup=series.setup,
         response=response,
         gains=series.settings,
-        reference_gain=reference,
+        reference_gain=solved.reference,
         log_gain=fit.log_gain,
         covariance=fit.covariance,
         settings=_settings(series, darks, flats, flat_maps, transfers),
@@ -116,10 +104,45 @@ def calibrate(
         saturation_counts=saturation,
         unit=series.energy_unit,
         figures=figures_of_merit(evidence),
-        tables=_tables(runs, used, fit, saturation),
+        tables=_tables(solved, saturation),
         notes=tuple(dict.fromkeys([*reader.notes, *fit.notes])),
         provenance=_provenance(series),
     )
+
+
+class _Solved(NamedTuple):
+    """The joint fit with the runs it came from, their means set straight."""
+
+    fit: JointFit
+    response: Response
+    reference: float
+    used: list[Run]
+    runs: list[Run]
+
+
+def _solve(
+    runs: list[Run],
+    darks: Mapping[float, DarkField],
+    reader: Reader,
+    *,
+    saturation: float,
+    good: NDArray[np.bool_],
+) -> _Solved:
+    """Solve response and gains from the runs that can be used."""
+    chosen = usable(runs, saturation)
+    reference = reference_of(chosen, reader.series)
+    lowest_dark = min(float(np.median(field.picture[good])) for field in darks.values())
+    to_levels = partial(
+        levels_of,
+        series=reader.series,
+        reference=reference,
+        dark_variance={gain: field.statistics.variance for gain, field in darks.items()},
+        saturation_above_dark=saturation - lowest_dark,
+    )
+    fit, used = _fit_without_outliers(chosen, to_levels, reader)
+    straight = {run.where: run for run in used}
+    runs = [straight.get(run.where, run) for run in runs]
+    return _Solved(fit, _response(fit, used, saturation - lowest_dark), reference, used, runs)
 
 
 def _fit_without_outliers(
@@ -156,87 +179,6 @@ def _sensitivity(
     exposure = response.exposure(np.minimum(field.picture.astype(np.float64), response.limit))
     relative = exposure / float(exposure[typical].mean())
     return np.where(good & (relative > 0.0), relative, 1.0).astype(np.float32)
-
-
-def _transfers(
-    series: Series,
-    runs: Sequence[Run],
-    darks: Mapping[float, DarkField],
-    fit: JointFit,
-    response: Response,
-    saturation: float,
-    reader: Reader,
-) -> tuple[list[Transfer], list[float]]:
-    """Photon transfer of every setting, and the relative error that the response's own error adds."""
-    draws = _drawn_responses(fit, response)
-    transfers, systematic = [], []
-    for gain in series.settings:
-        members = [
-            run
-            for run in runs
-            if run.key.gain == gain
-            and not clipped(run, saturation)
-            and np.isfinite(run.statistics.variance)
-            and response.lowest <= run.statistics.mean <= response.highest
-        ]
-        if not members:
-            reader.notes.append(
-                f"gain {gain:g}: no run with two frames between dark and saturation: no photon transfer"
-            )
-        found = fit_transfer(_points(members, darks[gain], response))
-        transfers.append(found)
-        shots = (
-            [fit_transfer(_points(members, darks[gain], draw)).shot for draw in draws] if members else [0.0]
-        )
-        bent = BENT_NOISE if _is_bent(response) else 0.0
-        systematic.append(math.hypot(np.std(shots) / found.shot, bent) if found.shot > 0.0 else math.nan)
-        if found.outliers:
-            few = ", ".join(members[index].where for index in found.outliers[:3])
-            named = f"{few}{', ...' if len(found.outliers) > 3 else ''}"
-            reader.notes.append(
-                f"gain {gain:g}: the noise of {len(found.outliers)} of {len(members)} runs does not fit "
-                f"photon transfer; little weight was given to them ({named})"
-            )
-    return transfers, systematic
-
-
-def _is_bent(response: Response) -> bool:
-    """Whether the response departs from a straight line through the origin by more than 2 % somewhere."""
-    share = response.exposure(np.exp(response.log_counts)) / np.exp(response.log_counts)
-    return bool(share.max() > 1.02 * share.min())
-
-
-def _drawn_responses(fit: JointFit, response: Response) -> list[Response]:
-    rng = np.random.default_rng(20210616)
-    nodes = fit.log_counts.size
-    values, vectors = np.linalg.eigh(fit.covariance[:nodes, :nodes])
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    return [
-        replace(response, log_exposure=rising(fit.log_exposure + root @ rng.standard_normal(nodes)))
-        for _ in range(RESPONSE_DRAWS)
-    ]
-
-
-def _points(members: Sequence[Run], dark: DarkField, response: Response) -> TransferPoints:
-    counts = np.array([run.statistics.mean for run in members])
-    found = [run.statistics for run in members]
-    noise = np.sqrt([max(item.variance, 0.0) for item in found])
-    dark_variance = dark.statistics.variance
-    if not math.isfinite(dark_variance):
-        dark_variance, dark_error = 1.0 / 12.0, 1.0
-    else:
-        dark_error = dark.statistics.variance_stderr
-    size = 2 * LAG_REACH + 1
-    return TransferPoints(
-        variance=np.array([item.variance for item in found]),
-        variance_stderr=np.array([item.variance_stderr for item in found]),
-        lever=response.exposure(counts) / response.secant(counts, noise) ** 2,
-        lags=np.array([item.lags for item in found]).reshape(-1, size, size),
-        pixels=np.array([item.lag_count * item.pixels for item in found], dtype=np.float64),
-        dark_variance=dark_variance,
-        dark_variance_stderr=dark_error,
-        dark_lags=dark.statistics.lags,
-    )
 
 
 def _settings(
@@ -276,8 +218,9 @@ def _linearity(used: Sequence[Run], reference: float) -> tuple[float, float]:
     return linearity_error(counts, energy)
 
 
-def _tables(runs: Sequence[Run], used: Sequence[Run], fit: JointFit, saturation: float) -> Mapping[str, Any]:
-    place = {run.where: index for index, run in enumerate(used)}
+def _tables(solved: _Solved, saturation: float) -> Mapping[str, Any]:
+    fit, runs = solved.fit, solved.runs
+    place = {run.where: index for index, run in enumerate(solved.used)}
     inside = [place.get(run.where, -1) for run in runs]
     residual = np.append(fit.residual, math.nan)
     scatter = np.append(fit.scatter, math.nan)

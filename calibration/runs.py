@@ -183,7 +183,12 @@ def _gaps(by_setting: Mapping[float, Sequence[Run]]) -> list[Fault]:
 
 
 def levels_of(
-    runs: Sequence[Run], series: Series, *, dark_variance: Mapping[float, float], saturation_above_dark: float
+    runs: Sequence[Run],
+    series: Series,
+    *,
+    reference: float,
+    dark_variance: Mapping[float, float],
+    saturation_above_dark: float,
 ) -> Levels:
     """Put usable runs into the form of the joint fit."""
     gains = series.settings
@@ -202,7 +207,6 @@ def levels_of(
     known = np.array(
         [math.log(setup.known_gain[gain]) if gain in setup.known_gain else math.nan for gain in gains]
     )
-    reference = reference_of(runs, series)
     return Levels(
         counts=np.array([run.statistics.mean for run in runs]),
         counts_stderr=np.array([run.statistics.mean_stderr for run in runs]),
