@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 # What the statements call "no difference": 5 % of a width cannot be read off the paper's figure.
 SMALL = 0.05
 _COLUMNS = ("transmitted", "spot_fwhm", "spot_rms", "pulse_fwhm", "pulse_rms")
-_PLOTTED = ("spot_rms", "pulse_fwhm")
+_PLOTTED = ("spot_fwhm", "pulse_fwhm")
 
 Beam = tuple[float, float]
 """Divergence (rad) and spot (m), both full widths at half maximum."""
@@ -73,6 +73,10 @@ def _apart(beams: Sequence[Flux], quantity: str, plane: int) -> Estimate:
     return ratio(difference(widths[-1], widths[0]), widths[0]) if len(widths) > 1 else Estimate(0.0, 0.0)
 
 
+def _surely_large(apart: Estimate) -> bool:
+    return apart.value - 2 * apart.stderr > SMALL
+
+
 def _radius_statement(beams: dict[Beam, Flux], quantity: str) -> Statement:
     divergences = sorted({divergence for divergence, _ in beams})
     distances = next(iter(beams.values())).distances
@@ -84,13 +88,13 @@ def _radius_statement(beams: dict[Beam, Flux], quantity: str) -> Statement:
         for plane in range(len(distances))
     }
     (divergence, plane), worst = max(apart.items(), key=lambda item: item[1].value)
-    large = [distances[p] for (_, p), value in apart.items() if value.value > SMALL]
+    large = [distances[p] for (_, p), value in apart.items() if _surely_large(value)]
     numbers = (
         f"The spots of one divergence differ most by {shown(worst, percent=True)}, at "
         f"{1e3 * divergence:.0f} mrad and {distances[plane]:g} m"
     )
     if large:
-        numbers += f"; by less than {100 * SMALL:.0f} % everywhere beyond {max(large):g} m"
+        numbers += f"; nowhere beyond {max(large):g} m by more than {100 * SMALL:.0f} % for sure"
     return Statement(
         f"The initial radius does not matter at one divergence ({quantity}).", not large, f"{numbers}."
     )
@@ -126,14 +130,16 @@ def _pulse_statement(beams: dict[Beam, Flux]) -> Statement:
     fluxes = list(beams.values())
     apart = [_apart(fluxes, "pulse_fwhm", plane) for plane in range(len(distances))]
     plane = max(range(len(distances)), key=lambda p: apart[p].value)
+    large = [float(distances[p]) for p in range(len(distances)) if _surely_large(apart[p])]
     first, last = _at(fluxes[0], "pulse_fwhm", 0), _at(fluxes[0], "pulse_fwhm", -1)
     numbers = (
-        f"All beams differ by at most {shown(apart[plane], percent=True)}, at {distances[plane]:g} m; "
+        f"All beams differ by at most {shown(apart[plane], percent=True)}, at {distances[plane]:g} m"
+        f"{f', and by more than {100 * SMALL:.0f} % only from {min(large):g} m on' if large else ''}; "
         f"the pulse grows from {1e9 * first.value:.4f} ns at {distances[0]:g} m "
-        f"to {1e9 * last.value:.4f} ns at {distances[-1]:g} m."
+        f"to {1e9 * last.value:.2f} ns at {distances[-1]:g} m."
     )
     text = "Temporal broadening hardly depends on divergence or initial radius."
-    return Statement(text, apart[plane].value < SMALL, numbers)
+    return Statement(text, not large, numbers)
 
 
 def _figure(beams: dict[Beam, Flux]) -> Figure:
@@ -146,9 +152,11 @@ def _figure(beams: dict[Beam, Flux]) -> Figure:
     for (divergence, spot), flux in beams.items():
         look = {"color": colours[divergence], "linestyle": styles.get(spot, "-.")}
         label = f"{1e3 * divergence:.0f} mrad, {1e3 * spot:g} mm"
-        space.errorbar(flux.distances, 1e3 * flux.spot_rms, 1e3 * flux.spot_rms_stderr, label=label, **look)
+        space.errorbar(flux.distances, 1e3 * flux.spot_fwhm, 1e3 * flux.spot_fwhm_stderr, label=label, **look)
         pulse.errorbar(flux.distances, 1e9 * flux.pulse_fwhm, 1e9 * flux.pulse_fwhm_stderr, **look)
-    space.set(xlabel="distance (m)", ylabel="root mean square radius (mm)", xscale="log", yscale="log")
+    space.set(
+        xlabel="distance (m)", ylabel="spot, full width at half maximum (mm)", xscale="log", yscale="log"
+    )
     space.legend(fontsize="x-small", ncols=2)
     pulse.set(xlabel="distance (m)", ylabel="pulse, full width at half maximum (ns)")
     return figure
