@@ -15,7 +15,10 @@ def sweep(
     output: Annotated[Path, typer.Option("--output", "-o", help="Folder for units, table and plot.")],
     settings: Annotated[
         list[str] | None,
-        typer.Option("--set", help='KEY="VALUE,VALUE" or KEY="START to STOP in COUNT", with log behind it for equal ratios; several times.'),
+        typer.Option(
+            "--set",
+            help='KEY="VALUE,VALUE" or KEY="START to STOP in COUNT" (log behind it: equal ratios).',
+        ),
     ] = None,
     zipped: Annotated[
         bool, typer.Option("--zip", help="Take the lists side by side instead of all combinations.")

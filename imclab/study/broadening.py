@@ -70,7 +70,8 @@ def _at(flux: Flux, quantity: str, plane: int) -> Estimate:
 def _apart(beams: Sequence[Flux], quantity: str, plane: int) -> Estimate:
     """Relative difference between the widest and the narrowest of some beams at one plane."""
     widths = sorted((_at(flux, quantity, plane) for flux in beams), key=lambda width: width.value)
-    return ratio(difference(widths[-1], widths[0]), widths[0]) if len(widths) > 1 else Estimate(0.0, 0.0)
+    over = ratio(widths[-1], widths[0])
+    return Estimate(over.value - 1.0, over.stderr)
 
 
 def _surely_large(apart: Estimate) -> bool:

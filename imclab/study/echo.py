@@ -126,7 +126,11 @@ def _figure(curves: Curves) -> Figure:
         above.plot(1e9 * times, (power - backscatter) / peak, "C3--", label="target")
         above.set_title(f"optical depth {whole.optical_depth:.2f}, not gated")
         times, power, _ = _power(gated)
-        below.plot(1e9 * times, power / peak, "C3", label="all light that the gate passes")
+        shut = np.array([0.0])
+        times = np.concatenate([times[:1], times, times[-1:]])
+        below.plot(
+            1e9 * times, np.concatenate([shut, power / peak, shut]), "C3", label="what the gate passes"
+        )
         below.set_title(f"optical depth {gated.optical_depth:.2f}, gated")
         for axes in (above, below):
             axes.set(xlabel="time (ns)", ylabel="power over the peak above", xlim=(0, end))

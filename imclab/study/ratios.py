@@ -10,8 +10,8 @@ from imclab.uncertainty import Estimate
 def ratio(numerator: Estimate, denominator: Estimate) -> Estimate:
     """Return the ratio of two independent estimates, its error to first order."""
     value = numerator.value / denominator.value
-    relative = math.hypot(numerator.stderr / numerator.value, denominator.stderr / denominator.value)
-    return Estimate(value, abs(value) * relative)
+    stderr = math.hypot(numerator.stderr, value * denominator.stderr) / abs(denominator.value)
+    return Estimate(value, stderr)
 
 
 def difference(left: Estimate, right: Estimate) -> Estimate:
