@@ -14,7 +14,7 @@ from typing import Any
 
 from rig.dialect import Identity, Line, Names, Property, Step, Steps, Switch, unknown_property
 from rig.errors import Fault, PlanError, ReplyError
-from rig.models import MODELS
+from rig.models import MODELS, output_named
 from rig.quantity import Quantity, decimal_text, exact, nearest
 
 _LONGEST_PS = 999_999_999_999_750
@@ -106,6 +106,10 @@ class BNC575:
         """Read the reply to ``*IDN?``, or None if no box of this family gave it."""
         fields = re.fullmatch(r"(QC|BNC),([\w+-]+),(\w+),([\w.-]+)", reply)
         return None if fields is None else Identity(fields[1], fields[2], fields[3], fields[4], reply)
+
+    def output_named(self, name: str) -> str:
+        """Return the output called ``name``, with or without its ``CH``."""
+        return output_named(self.model, name)
 
     def property(self, name: str, output: str | None) -> Property:
         """Return one property with its lines.

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from rig.dialect import Identity, Line, Names, Property, Step, Steps, Switch, unknown_property
 from rig.errors import Fault, ReplyError
-from rig.models import MODELS
+from rig.models import MODELS, output_named
 from rig.quantity import Quantity
 
 _EDGES = ("T0", "T1", "A", "B", "C", "D", "E", "F", "G", "H")
@@ -112,6 +112,10 @@ class DG645:
         fields = re.fullmatch(r"([^,]*Stanford[^,]*),(DG645),(?:s/n)?(\w+),ver([\w.]+)", reply)
         return None if fields is None else Identity(fields[1], fields[2], fields[3], fields[4], reply)
 
+    def output_named(self, name: str) -> str:
+        """Return the output called ``name``; T0 is one too, with levels but no times of its own."""
+        return "T0" if name.upper() == "T0" else output_named(self.model, name)
+
     def property(self, name: str, output: str | None) -> Property:
         """Return one property with its lines.
 
@@ -129,6 +133,8 @@ class DG645:
         if name in _OUTPUT_NUMBERS:
             mnemonic, steps, decimals = _OUTPUT_NUMBERS[name]
             return _numbered(name, output, steps, mnemonic, f"{index}", decimals)
+        if output == "T0":
+            raise unknown_property(name, ("polarity", *_OUTPUT_NUMBERS), self.model)
         rise, fall = 2 * index, 2 * index + 1
         if name == "delay":
             return _edge_time(name, output, rise, 0)

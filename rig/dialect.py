@@ -187,6 +187,9 @@ class Dialect(Protocol):
     def identity(self, reply: str) -> Identity | None:
         """Read the reply to ``*IDN?``, or None if it is no box of this family."""
 
+    def output_named(self, name: str) -> str:
+        """Return the output called ``name``, or refuse."""
+
     def property(self, name: str, output: str | None) -> Property:
         """Return one property with its lines."""
 

@@ -6,29 +6,16 @@ after everything that the tube depends on has been read back and found within th
 
 from __future__ import annotations
 
-import atexit
-import contextlib
 from dataclasses import dataclass
 from fractions import Fraction
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
-from rig.conversation import Conversation
-from rig.dialect import Dialect, Identity, Property
-from rig.errors import (
-    Fault,
-    LimitError,
-    LinkError,
-    PlanError,
-    ReadBackError,
-)
-from rig.interruption import interruptible, undisturbed
-from rig.limits import Limits
-from rig.ownership import Ownership
-from rig.safe_state import make_safe
+from rig.dialect import Property
+from rig.errors import Fault, LimitError, PlanError, ReadBackError
 from rig.safeguards import check_plan, check_setting, check_state, refuse
-from rig.timing import GatePlan, output_named
-from rig.verified import Applied, VerifiedSettings
+from rig.session import Session
+from rig.timing import GatePlan
+from rig.verified import Applied
 
 
 @dataclass(frozen=True)
@@ -41,128 +28,10 @@ class AppliedGate:
     width_ps: int
 
 
-class Generator:
-    """A delay generator; nothing is opened before ``open`` or ``with``.
+class Generator(Session):
+    """A delay generator that can be read, programmed and armed; what ``open_generator`` returns."""
 
-    Parameters
-    ----------
-    conversation : Conversation
-    ownership : Ownership or None
-        The port's lock; None where there is no port.
-    limits : Limits or None
-        Without them nothing can be armed, nor a level changed.
-    read_only : bool
-        Refuse every set, and leave the box as it is.
-    """
-
-    def __init__(
-        self,
-        conversation: Conversation,
-        *,
-        ownership: Ownership | None,
-        limits: Limits | None,
-        read_only: bool,
-    ) -> None:
-        self.conversation = conversation
-        self.dialect: Dialect = conversation.dialect
-        self.limits = limits
-        self.inherited: dict[str, Any] = {}
-        self._ownership = ownership
-        self._read_only = read_only
-        self._open = False
-        self._verified = VerifiedSettings(conversation)
-        self._running = False
-        self.gate_output = limits.output if limits else self.dialect.model.outputs[0]
-        self._plan: GatePlan | None = None
-        self._signals = contextlib.ExitStack()
-
-    def __enter__(self) -> Self:
-        self._signals.enter_context(interruptible())
-        try:
-            self.open()
-        except BaseException:
-            self._signals.close()
-            raise
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        try:
-            with undisturbed():
-                self.close(failed=kind is not None)
-        finally:
-            self._signals.close()
-
-    @property
-    def identity(self) -> Identity:
-        """Who answered ``*IDN?`` when the port was opened."""
-        identity = self.conversation.identity
-        if identity is None:
-            raise LinkError(f"{self.conversation.link.name}: not open; wanted box.open() or a with block")
-        return identity
-
-    def open(self) -> None:
-        """Take the port, learn who is there, and read all settings.
-
-        Raises
-        ------
-        OwnedError, LinkError
-            If the port is taken, or nothing answers.
-        LimitError
-            If the limits are for another box.
-        """
-        if self._open:
-            return
-        journal = self.conversation.journal
-        journal.open()
-        if self._ownership is not None:
-            self._ownership.take()
-        try:
-            journal.write("open", self.conversation.link.name, model=self.dialect.model.name,
-                          limits=self.limits.digest if self.limits else None)  # fmt: skip
-            identity = self.conversation.open()
-            self._check_identity(identity)
-            if not self._read_only:
-                for line in self.dialect.opening_lines():
-                    self._verified.send((line,), (), line)
-                self._verified.touched = False
-            snapshot = self._verified.everything()
-            self.inherited = snapshot.settings
-            self._running = self.inherited["trigger_source"] != "off"
-            journal.write("settings", identity.text, **snapshot._asdict())
-        except BaseException:
-            self._let_go()
-            raise
-        self._open = True
-        atexit.register(self.close, failed=True)
-
-    def close(self, *, failed: bool = False) -> None:
-        """Make the box safe if anything was sent to it, and give the port back; safe to call twice.
-
-        Parameters
-        ----------
-        failed : bool
-            The work did not end as meant: the gate is narrowed as well, not only its triggers stopped.
-
-        Raises
-        ------
-        NotConfirmedSafeError
-            If the safe state could not be read back.
-        """
-        if not self._open:
-            return
-        self._open = False
-        atexit.unregister(self.close)
-        try:
-            if self._verified.touched:
-                self.make_safe(narrow=failed)
-        finally:
-            self.conversation.journal.write("close", "failed" if failed else "done")
-            self._let_go()
+    _plan: GatePlan | None = None
 
     def read(self, name: str, output: str | None = None) -> Any:
         """Return one setting, asked twice.
@@ -201,11 +70,11 @@ class Generator:
         native = wanted.domain.native(value, wanted.where)
         shown = wanted.domain.shown(native)
         self._check_setting(wanted, shown)
-        if name == "trigger_source" and shown != "off":
-            return self.arm(shown)
-        if name != "trigger_source" and self._running:
+        if name == "trigger_source":
+            return self.disarm() if shown == "off" else self.arm(shown)
+        if self._running:
             self.disarm()
-        return self.disarm() if name == "trigger_source" else self._verified.set(wanted, value, native)
+        return self._verified.set(wanted, value, native)
 
     def apply(self, plan: GatePlan) -> AppliedGate:
         """Program a planned gate with the triggers off, and read all of it back.
@@ -225,11 +94,24 @@ class Generator:
                 done.append(self.set(name, value, plan.output))
         for step in self.dialect.gate_steps(plan.output, plan.delay_ps, plan.width_ps):
             done.append(self.set(step.name, step.value, step.output))
-        delay, width = (self.read(name, plan.output) for name in ("delay", "width"))
-        if (delay, width) != (plan.delay_ps, plan.width_ps):
-            held, wanted = f"{delay} ps, {width} ps wide", f"{plan.delay_ps} ps, {plan.width_ps} ps wide"
-            raise ReadBackError(f"{plan.output}: the gate reads {held}; wanted {wanted}")
-        return AppliedGate(plan, tuple(done), delay, width)
+        self.check_held(plan.delay_ps)
+        return AppliedGate(plan, tuple(done), plan.delay_ps, plan.width_ps)
+
+    def check_held(self, delay_ps: int) -> None:
+        """Read the gate once more, all of it: somebody at the panel or a power cut may have changed it.
+
+        Raises
+        ------
+        ReadBackError
+            If the box does not hold the applied plan at this delay, or fires when it should not.
+        """
+        assert self._plan is not None, "apply a plan first"
+        wanted = {"delay": delay_ps, "width": self._plan.width_ps}
+        held = {name: self.read(name) for name in wanted}
+        running = self.read("trigger_source") != "off"
+        if held != wanted or running != self._running:
+            firing = "running" if running else "stopped"
+            raise ReadBackError(f"{self.gate_output}: the box holds {held}, {firing}; wanted {wanted}")
 
     def arm(self, trigger: str | None = None) -> Applied:
         """Let the box fire, after all that the tube depends on was read back and found within the limits.
@@ -252,6 +134,8 @@ class Generator:
     def move_gate(self, delay_ps: int, *, then_trigger: str | None = None) -> int:
         """Move the applied gate to another delay with the triggers stopped, and return what is read back.
 
+        Before the triggers start again the width is read back as well.
+
         Parameters
         ----------
         delay_ps : int
@@ -259,14 +143,24 @@ class Generator:
         then_trigger : str, optional
             What to arm again afterwards; without it the triggers stay off.
         """
+        if self._plan is None:
+            raise PlanError("move", [Fault("gate", "none", "an applied plan", "Call apply first.")])
         wanted = self._property("delay", None)
         native = wanted.domain.native(Fraction(delay_ps, 10**12), wanted.where)
-        shown = wanted.domain.shown(native)
-        self._check_setting(wanted, shown)
+        self._check_setting(wanted, wanted.domain.shown(native))
+        if self._running and then_trigger is None:
+            self.disarm()
+        again = self._running
         source = self._property("trigger_source", None)
-        again = self._running and then_trigger is not None
-        stop = source.commands("off") if self._running else ()
-        applied = self._verified.set(wanted, delay_ps, native, before=stop)
+        width = self._property("width", None)
+        held = (width, width.domain.native(Fraction(self._plan.width_ps, 10**12), width.where))
+        applied = self._verified.set(
+            wanted,
+            delay_ps,
+            native,
+            before=source.commands("off") if again else (),
+            held=held if again else None,
+        )
         if again:
             self._verified.set(source, then_trigger, source.domain.native(then_trigger, source.where))
         elif then_trigger is not None:
@@ -282,18 +176,6 @@ class Generator:
         self._running = False
         return applied
 
-    def make_safe(self, *, narrow: bool = True) -> None:
-        """Stop the triggers and, with ``narrow``, make the gate as narrow as the box can; read both back.
-
-        Raises
-        ------
-        NotConfirmedSafeError
-            If this could not be confirmed; the box may still gate the tube.
-        """
-        steps = self.dialect.safe_steps(self.gate_output)
-        make_safe(self._verified, [step for step in steps if narrow or step.name != "width"])
-        self._running = False
-
     def save(self, slot: int) -> None:
         """Store all settings in the box's memory ``slot`` (1 to 9)."""
         self._check_slot(slot)
@@ -302,10 +184,22 @@ class Generator:
     def recall(self, slot: int) -> dict[str, Any]:
         """Recall settings from ``slot``, with the triggers stopped in the same breath, and return them."""
         self._check_slot(slot)
+        if self.limits is None:
+            raise LimitError("recall", [Fault("limits", "none", "a limits file: memories hold levels too")])
         self._verified.send(self.dialect.recall_lines(slot), (), f"recall {slot}")
         self.set("trigger_source", "off")
         snapshot = self._verified.everything()
         self.conversation.journal.write("settings", f"recalled {slot}", **snapshot._asdict())
+        if self.limits is not None:
+            gate = snapshot.settings[self.gate_output]
+            levels = (("polarity", "polarity"), ("amplitude", "amplitude_mV"), ("offset", "offset_mV"))
+            faults = [
+                fault
+                for name, key in levels
+                if key in gate
+                for fault in self.limits.faults_of_setting(name, self.gate_output, gate[key])
+            ]
+            refuse("recalled settings (the triggers are off)", faults)
         return snapshot.settings
 
     def check_range(self, plan: GatePlan, first_ps: int, last_ps: int) -> None:
@@ -315,15 +209,6 @@ class Generator:
         check_plan(plan.with_delay(first_ps), self.dialect, self.limits)
         check_plan(plan.with_delay(last_ps), self.dialect, self.limits)
         refuse("gate plan", self.dialect.conflicts(self.inherited, plan.output, first_ps, last_ps))
-
-    def _check_identity(self, identity: Identity) -> None:
-        if self.limits is None:
-            return
-        if self.limits.model != self.dialect.model.name:
-            raise LimitError("limits", [Fault("model", self.dialect.model.name, self.limits.model)])
-        if self.limits.serial != identity.serial:
-            advice = "Is this the right port? Each rig has limits of its own."
-            raise LimitError("limits", [Fault("serial", identity.serial, self.limits.serial, advice)])
 
     def _check_setting(self, wanted: Property, shown: Any) -> None:
         if self._read_only:
@@ -337,12 +222,4 @@ class Generator:
     def _property(self, name: str, output: str | None) -> Property:
         if output is None and name in self.dialect.output_properties:
             output = self.gate_output
-        if output is not None:
-            output = output.upper() if output.upper() == "T0" else output_named(self.dialect.model, output)
-        return self.dialect.property(name, output)
-
-    def _let_go(self) -> None:
-        self.conversation.link.close()
-        if self._ownership is not None:
-            self._ownership.release()
-        self.conversation.journal.close()
+        return self.dialect.property(name, None if output is None else self.dialect.output_named(output))

@@ -102,3 +102,13 @@ def model_named(name: str) -> Model:
         hint = f"Did you mean {near[0]!r}?" if near else ""
         raise PlanError("model", [Fault("model", repr(name), " or ".join(map(repr, MODELS)), hint)])
     return MODELS[key]
+
+
+def output_named(box: Model, name: str | None) -> str:
+    """Return the output called ``name`` (the first one when None), or refuse."""
+    if name is None:
+        return box.outputs[0]
+    plain = name.upper().removeprefix("CH")
+    if plain not in box.outputs:
+        raise PlanError("output", [Fault("output", repr(name), f"one of {', '.join(box.outputs)}")])
+    return plain

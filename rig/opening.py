@@ -14,12 +14,11 @@ from rig.generator import Generator
 from rig.journal import Journal
 from rig.limits import Limits, load_limits
 from rig.link import Link, SerialLink
-from rig.models import model_named
+from rig.models import model_named, output_named
 from rig.ownership import Ownership
 from rig.quantity import Quantity, seconds
 from rig.simulator import simulated_device
 from rig.simulator.faults import Device
-from rig.timing import output_named
 
 
 def open_generator(

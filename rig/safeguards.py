@@ -37,6 +37,8 @@ def check_plan(plan: GatePlan, dialect: Dialect, limits: Limits | None) -> None:
         if level is not None:
             wanted = dialect.property(name, plan.output)
             check_setting(wanted, wanted.domain.shown(wanted.domain.native(level, wanted.where)), limits)
+    source = dialect.property("trigger_source", None)
+    source.domain.native(plan.trigger, source.where)
     if limits is None:
         return
     faults = limits.faults_of_gate(
@@ -72,7 +74,14 @@ def check_state(
     """
     if limits is None:
         raise LimitError("arming", [Fault("trigger_source", repr(source), "a limits file first", _ADVICE)])
-    if source == "internal":
-        rate_hz = Fraction(settings["trigger_rate_uHz"], 10**6) if "trigger_rate_uHz" in settings else None
-        rate_hz = rate_hz or Fraction(10**12, settings["trigger_period_ps"])
-    refuse("arming", limits.faults_of_state(settings, rate_hz))
+    rates = [_internal_rate(settings) if source == "internal" else rate_hz or limits.max_rate_hz]
+    if settings["burst"]:
+        within = settings.get("burst_period_ps") or settings["trigger_period_ps"]
+        rates.append(Fraction(10**12, within))
+    refuse("arming", limits.faults_of_state(settings, max(rates)))
+
+
+def _internal_rate(settings: dict[str, Any]) -> Fraction:
+    if "trigger_rate_uHz" in settings:
+        return Fraction(settings["trigger_rate_uHz"], 10**6)
+    return Fraction(10**12, settings["trigger_period_ps"])

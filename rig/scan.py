@@ -124,7 +124,8 @@ def run_scan(
 ) -> Iterator[ScanStep]:
     """Sweep, and yield each step once it is read back and its frame is taken.
 
-    The whole sweep is checked before its first byte.
+    The whole sweep is checked before its first byte; after its last step the gate is read once more,
+    so that a power cut on the way does not pass.
 
     Parameters
     ----------
@@ -168,6 +169,7 @@ def run_scan(
             signal = grab(step)
             step = replace(step, signal=None if signal is None else float(signal))
         yield step
+    box.check_held(scan.delays_ps[-1])
 
 
 def write_steps(path: str | os.PathLike[str], steps: Iterable[ScanStep]) -> None:

@@ -15,7 +15,7 @@ from math import sqrt
 
 from rig import path
 from rig.errors import Fault, PlanError
-from rig.models import Model, model_named
+from rig.models import Model, model_named, output_named
 from rig.path import PS, SPEED_OF_LIGHT, Part
 from rig.quantity import Quantity, engineering_time, exact, nearest
 
@@ -253,7 +253,7 @@ def plan_gate(
         jitter_ps=sqrt(float(path.positive(jitter, "time", "jitter") * PS) ** 2 + box.jitter_ps**2),
         uncertainty_ps=unsure,
         uncertainty_source=source,
-        trigger=trigger,
+        trigger=trigger.replace("-", " ").replace("_", " ").lower(),
         rate_hz=None if rate is None else path.positive(rate, "rate", "rate", zero=False),
         polarity=polarity,
         amplitude=amplitude,
@@ -263,16 +263,6 @@ def plan_gate(
     if faults:
         raise PlanError("gate plan", faults)
     return plan
-
-
-def output_named(box: Model, name: str | None) -> str:
-    """Return the output called ``name`` (the first one when None), or refuse."""
-    if name is None:
-        return box.outputs[0]
-    plain = name.upper().removeprefix("CH")
-    if plain not in box.outputs:
-        raise PlanError("output", [Fault("output", repr(name), f"one of {', '.join(box.outputs)}")])
-    return plain
 
 
 def calibrated_offset(

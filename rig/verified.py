@@ -69,9 +69,18 @@ class VerifiedSettings:
         return Snapshot(found, tuple(commands))
 
     def set(
-        self, wanted: Property, requested: Any, native: Native, *, before: tuple[str, ...] = ()
+        self,
+        wanted: Property,
+        requested: Any,
+        native: Native,
+        *,
+        before: tuple[str, ...] = (),
+        held: tuple[Property, Native] | None = None,
     ) -> Applied:
-        """Set one property; ``before`` goes out in the same block, ahead of it.
+        """Set one property and read it back.
+
+        In the same block ``before`` goes out ahead of it, and ``held``, another property, must read as
+        it should.
 
         Raises
         ------
@@ -81,13 +90,20 @@ class VerifiedSettings:
             If the box holds something else afterwards.
         """
         read: Native = None
+        also = held[0].queries if held else ()
         meaning = f"{wanted.where} = {wanted.domain.shown(native)}"
         try:
-            read = wanted.parse(self.send((*before, *wanted.commands(native)), wanted.queries, meaning))
+            queries = (*wanted.queries, *also)
+            replies = self.send((*before, *wanted.commands(native)), queries, meaning)
+            split = len(wanted.queries)
+            if held is None or held[0].parse(replies[split:]) == held[1]:
+                read = wanted.parse(replies[:split])
         except ReplyError as error:
             self.conversation.resynchronise(str(error))
         if read != native:
             read = self._read_in_doubt(wanted, native)
+            if held is not None:
+                self._read_in_doubt(*held)
         shown = wanted.domain.shown
         return Applied(wanted.name, wanted.output, wanted.domain.unit, requested, shown(native), shown(read))
 

@@ -27,6 +27,7 @@ from imclab.commands.gate_options import (
 app = typer.Typer(no_args_is_help=True, help="Time the gate of an image intensifier over a serial line.")
 
 _JOURNAL = Path("gate-journal.jsonl")
+_LOOK_S = 1.0
 
 
 @app.command()
@@ -69,7 +70,7 @@ def set_gate(
         changes = list(rig.differences(box.inherited, box.settings()))
         sent = [block.decode("latin-1") for block in box.conversation.journal.sent]
         if arm and live:
-            _stay_armed(hold)
+            _stay_armed(box, plan, hold)
     data = {
         **rig.plan_dict(plan),
         "live": live,
@@ -264,12 +265,14 @@ def _needed(port: str | None) -> str:
     return port
 
 
-def _stay_armed(hold: str | None) -> None:
+def _stay_armed(box: rig.Generator, plan: rig.GatePlan, hold: str | None) -> None:
+    """Wait, and look every second whether the box still holds the gate."""
     seconds = None if hold is None else rig.seconds(hold)
     end = None if seconds is None else time.monotonic() + seconds
     Progress()(f"ARMED{'' if hold is None else f' for {hold}'}; Ctrl-C makes it safe", final=True)
     while end is None or time.monotonic() < end:
-        time.sleep(0.1 if end is None else max(0.0, min(0.1, end - time.monotonic())))
+        time.sleep(_LOOK_S if end is None else max(0.0, min(_LOOK_S, end - time.monotonic())))
+        box.check_held(plan.delay_ps)
 
 
 def _run_grab(command: str, step: rig.ScanStep) -> float | None:

@@ -66,8 +66,6 @@ def with_plan_options(command: Callable[..., None]) -> Callable[..., None]:
         chosen = {} if gate is None else rig.load_gate(gate)
         from_words = {name: given.pop(name) for name in _PLAN_HELP}
         chosen |= {name: value for name, value in from_words.items() if value is not None}
-        if "trigger" in chosen:
-            chosen["trigger"] = chosen["trigger"].replace("-", " ")
         command(rig.plan_gate(**chosen), **given)
 
     hints = typing.get_type_hints(command, include_extras=True)

@@ -42,6 +42,8 @@ def scan_delays(made: Bench, model: str) -> None:
     sweep = rig.plan_scan(plan, start="39.9 m", stop="40.1 m", points=4)
     for step in rig.run_scan(made.box, sweep):
         assert step.read_ps == step.sent_ps == true_delay_ps(made, model)
+    width = made.told("DLAY?3" if model == "dg645" else ":PULSE1:WIDT?").split(",")[-1]
+    assert round(Fraction(width) * 10**12) == plan.width_ps
 
 
 JOBS = {"set": set_delay, "read": read_delay, "scan": scan_delays}

@@ -211,3 +211,28 @@ def test_outputs_that_hang_on_the_gate_stop_an_impossible_move() -> None:
     made.device.feed("DLAY4,2,-0.4")
     with made.box as box, pytest.raises(rig.PlanError, match=r"CD\.delay"):
         box.apply(rig.plan_gate(delay="100 ns"))
+
+
+def test_a_burst_is_not_a_way_around_the_rate() -> None:
+    made = opened("dg645", max_rate="1 kHz")
+    made.box.apply(rig.plan_gate("40 m"))
+    made.box.set("burst_period", "100 us")
+    made.box.set("burst", True)
+    with pytest.raises(rig.LimitError, match="rate"):
+        made.box.arm()
+    made.box.set("burst_period", "1 ms")
+    assert made.box.arm().read == "external rising"
+
+
+def test_recalled_levels_are_looked_at() -> None:
+    made = opened("dg645", polarities=["positive"])
+    made.device.feed("LPOL1,0")
+    made.device.feed("*SAV4")
+    made.device.feed("LPOL1,1")
+    with pytest.raises(rig.LimitError, match="polarity"):
+        made.box.recall(4)
+    assert made.told("TSRC?") == "5"
+    without = bench("dg645")
+    without.box.open()
+    with pytest.raises(rig.LimitError, match="limits file"):
+        without.box.recall(4)

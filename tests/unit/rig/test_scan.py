@@ -162,3 +162,35 @@ def test_no_peak_and_half_a_peak_are_refused() -> None:
         rig.find_target(plan, delays, signal)
     with pytest.raises(rig.PlanError, match="at least 5"):
         rig.find_target(plan, delays[:3], signal[:3])
+
+
+@pytest.mark.parametrize("looking", [True, False])
+def test_a_power_cut_in_mid_scan_does_not_pass(looking: bool) -> None:
+    """The delay is set anew at the next step, but the width is that of power-up: 10 ns for 3 ns."""
+    made = bench("dg645", limits=generous_limits("dg645"))
+    sweep = rig.plan_scan(rig.plan_gate("40 m"), start="39 m", stop="41 m", points=10)
+    widths = []
+
+    def grab(step: rig.ScanStep) -> float:
+        widths.append(made.told("DLAY?3"))
+        if step.index == 4:
+            made.device.power_cycle()
+        return 1.0
+
+    with pytest.raises(rig.ReadBackError, match="10000"), made.box as box:
+        for step in rig.run_scan(box, sweep, grab=grab if looking else None):
+            if step.index == 4 and not looking:
+                made.device.power_cycle()
+    assert widths == (["2,+0.000000003000"] * 5 if looking else [])
+
+
+def test_a_hand_at_the_panel_is_seen_while_armed() -> None:
+    made = bench("dg645", limits=generous_limits("dg645"))
+    with made.box as box:
+        plan = rig.plan_gate("40 m")
+        box.apply(plan)
+        box.arm()
+        box.check_held(plan.delay_ps)
+        made.device.feed("DLAY3,2,0.001")
+        with pytest.raises(rig.ReadBackError, match="1000000000"):
+            box.check_held(plan.delay_ps)
