@@ -38,9 +38,13 @@ def background(experiment: Experiment, path: Path, camera: calibration.Calibrati
     ]
     return Context(
         calibration=tuple(
-            Entry(f"{figure.name} at {figure.setting:g}", figure.value, figure.unit, figure.stderr)
-            if math.isfinite(figure.setting)
-            else Entry(figure.name, figure.value, figure.unit, figure.stderr)
+            Entry(
+                figure.name,
+                figure.value,
+                figure.unit,
+                math.hypot(figure.stderr, figure.systematic),
+                setting=f"{figure.setting:g}" if math.isfinite(figure.setting) else "",
+            )
             for figure in camera.figures
         ),
         response=_response_curve(camera),

@@ -15,13 +15,15 @@ FloatArray = NDArray[np.float64]
 class Entry:
     """One line of a table: a name and a number with its unit, or a text.
 
-    ``stderr`` is the standard uncertainty, in the same unit.
+    ``stderr`` is the standard uncertainty, in the same unit. Numbers of one name that differ by a
+    setting (of the intensifier) stand in one line, a column for each setting.
     """
 
     name: str
     value: float | int | str
     unit: str = ""
     stderr: float | None = None
+    setting: str = ""
 
 
 @dataclass(frozen=True)

@@ -36,7 +36,7 @@ class Detail:
     Attributes
     ----------
     across, down : Both
-        Profiles along the columns and along the rows through the middle of the figure, J per pixel.
+        Profiles along the columns and along the rows where they cross most of the figure, J per pixel.
     contrast : (measured, simulated) Estimate
         Michelson contrast between the pixels that the simulation shows bright and the others.
     edge : (measured, simulated) EdgeResponse, or None
@@ -61,12 +61,11 @@ class Detail:
 def detail(pair: Pair, *, data_range: float) -> Detail:
     """Look at one pair in detail; ``data_range`` is that of the comparison."""
     bright = _bright(pair)
-    rows, columns = (round(float(index.mean())) for index in np.nonzero(bright))
     inside = pair.region
     measured, simulated = pair.measured_counts[inside], pair.simulated_counts[inside]
     return Detail(
-        across=_profiles(pair, axis=0, centre=rows),
-        down=_profiles(pair, axis=1, centre=columns),
+        across=_profiles(pair, bright, axis=0),
+        down=_profiles(pair, bright, axis=1),
         contrast=_contrasts(pair, bright),
         edge=_edges(pair),
         pixel_area=pixel_area(pair),
@@ -85,7 +84,11 @@ def _bright(pair: Pair) -> NDArray[np.bool_]:
     return np.asarray(pair.region & (pair.simulated > threshold_otsu(inside)))
 
 
-def _profiles(pair: Pair, *, axis: int, centre: int) -> Both:
+def _profiles(pair: Pair, bright: NDArray[np.bool_], *, axis: int) -> Both:
+    """Average the band that crosses most of the figure; the middle one of several."""
+    crossed = np.convolve(bright.sum(axis=1 - axis), np.ones(BAND), mode="same")
+    best = np.flatnonzero(crossed == crossed.max())
+    centre = int(best[best.size // 2])
     band = slice(max(centre - BAND // 2, 0), centre + BAND // 2 + 1)
     return Both(
         profile(pair.measured, pair.measured_stderr, pair.region, axis=axis, band=band),

@@ -87,7 +87,8 @@ def _nested(values: Any) -> Any:
 def _entry(entry: Entry) -> Document:
     if isinstance(entry.value, str):
         return {"name": entry.name, "text": entry.value}
-    return {"name": entry.name, **quantity(entry.value, entry.unit or "1", entry.stderr)}
+    told = {"name": entry.name, **quantity(entry.value, entry.unit or "1", entry.stderr)}
+    return told | ({"setting": entry.setting} if entry.setting else {})
 
 
 def verdict_of(outcome: Outcome) -> str:

@@ -10,7 +10,7 @@ _PREFIXES = {-18: "a", -15: "f", -12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3:
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 _THIN = "\u202f"  # narrow no-break space
 
-STYLES = ("plain", "bare", "signed", "percent", "signed percent", "share", "probability", "count")
+STYLES = ("plain", "compact", "bare", "signed", "percent", "signed percent", "share", "probability", "count")
 
 
 def worded(quantity: Mapping[str, Any], style: str = "plain") -> str:
@@ -22,7 +22,8 @@ def worded(quantity: Mapping[str, Any], style: str = "plain") -> str:
         ``value``, ``unit``, perhaps ``stderr`` and ``flag``.
     style : str
         One of `STYLES`. A percentage is the value times 100; a signed one always shows its sign; a
-        share is a whole percentage; a bare number stands under a heading with its unit.
+        share is a whole percentage; a bare number stands under a heading with its unit; a compact one
+        has its uncertainty in units of the last place: 0.871(12).
     """
     value, stderr, unit = quantity["value"], quantity.get("stderr"), quantity["unit"]
     if value is None:
@@ -36,12 +37,15 @@ def worded(quantity: Mapping[str, Any], style: str = "plain") -> str:
     sign = "+" if style.startswith("signed") else ""
     if style.endswith("percent"):
         return f"{_rounded(100 * value, _times(stderr, 100), sign)}{_THIN}%"
+    if style == "compact" and stderr and 1e-8 < stderr < 1 and abs(value) < 1e6:
+        places = 1 - math.floor(math.log10(stderr))
+        return _minus(f"{value:.{places}f}({stderr * 10**places:.0f})")
     if unit in ("J", "s") and value:
         exponent = min(max(3 * math.floor(math.log10(abs(value)) / 3), -18), 3)
         factor = 10.0**-exponent
         return f"{_rounded(value * factor, _times(stderr, factor), sign)}{_THIN}{_PREFIXES[exponent]}{unit}"
     text = _rounded(value, stderr, sign)
-    return text if unit == "1" or style == "bare" else f"{text}{_THIN}{unit}"
+    return text if unit == "1" or style in ("bare", "compact") else f"{text}{_THIN}{unit}"
 
 
 def _times(stderr: float | None, factor: float) -> float | None:

@@ -7,12 +7,19 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 from numpy.typing import NDArray
 
 from imclab.agreement import Agreement, judged
 from imclab.comparison import Comparison, Outcome
-from imclab.report.figures.style import BOUND, MARKERS, MEASURED, SIMULATED, Margins, new_figure
+from imclab.report.figures.style import (
+    BOUND,
+    MARKERS,
+    MEASURED,
+    SIMULATED,
+    Margins,
+    new_figure,
+    plain_numbers,
+)
 from imclab.uncertainty import COVERAGE_95
 
 
@@ -42,7 +49,7 @@ def energy_curve(comparison: Comparison) -> Figure:
             label=f"relative to {reference}",
         )
     upper.set_yscale("log")
-    _plain_numbers(upper.yaxis)
+    plain_numbers(upper.yaxis)
     upper.set_ylabel("energy over that of the reference")
     upper.legend(loc="lower left")
     bound = 100 * max((outcome.error.bound for outcome in comparison.outcomes), default=0.3)
@@ -64,7 +71,7 @@ def energy_curve(comparison: Comparison) -> Figure:
 
 def bland_altman(comparison: Comparison, agreement: Agreement) -> Figure:
     """Difference against mean of the energy ratios, with bias and limits of agreement."""
-    figure, axes = new_figure(5.2, 3.0)
+    figure, axes = new_figure(5.2, 3.1, margins=Margins(top=0.36))
     plot, altman = axes[0, 0], agreement.bland_altman
     references = list(_groups(comparison))
     for outcome, mean, difference in zip(judged(comparison), altman.mean, altman.difference, strict=True):
@@ -72,9 +79,15 @@ def bland_altman(comparison: Comparison, agreement: Agreement) -> Figure:
         marker = MARKERS[group % len(MARKERS)]
         label = f"relative to {outcome.reference}"
         plot.plot(mean, 100 * difference, marker, color=SIMULATED, markersize=5.5, label=label)
-        place = (6, 4 if group % 2 == 0 else -11)
-        text = f"gain {outcome.pair.gain:g}"
-        plot.annotate(text, (mean, 100 * difference), place, textcoords="offset points", fontsize=7)
+        side = 1 if group % 2 == 0 else -1
+        plot.annotate(
+            f"gain {outcome.pair.gain:g}",
+            (mean, 100 * difference),
+            (7 * side, -2.5),
+            textcoords="offset points",
+            ha="left" if side > 0 else "right",
+            fontsize=7,
+        )
     for level, name, style in (
         (altman.bias.value, "bias", "-"),
         (altman.lower, "limits of agreement", (0, (5, 3))),
@@ -91,20 +104,13 @@ def bland_altman(comparison: Comparison, agreement: Agreement) -> Figure:
                 color=BOUND,
             )
     named = dict(zip(*reversed(plot.get_legend_handles_labels()), strict=True))  # one of each group
-    plot.legend(named.values(), named.keys())
+    plot.legend(named.values(), named.keys(), loc="lower left", bbox_to_anchor=(0, 1), ncols=2)
     plot.set_xscale("log")
-    _plain_numbers(plot.xaxis)
+    plain_numbers(plot.xaxis)
     plot.margins(x=0.25, y=0.2)
     plot.set_xlabel("mean of simulated and measured energy ratio")
     plot.set_ylabel("difference over mean / %")
     return figure
-
-
-def _plain_numbers(axis: Any) -> None:
-    """Write 0.2 rather than 2 × 10⁻¹ on a logarithmic axis."""
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
-    axis.set_major_formatter(StrMethodFormatter("{x:g}"))
-    axis.set_minor_formatter(NullFormatter())
 
 
 def _points(axes: Any, x: NDArray[np.float64], estimates: Sequence[Any], **style: Any) -> None:

@@ -97,11 +97,14 @@ def _show_light(plot: Any, edges: NDArray[np.float64], share: NDArray[np.float64
     plot.set_xlim(first - margin, last + margin)
 
 
-def registration_overlays(comparison: Comparison, *, magnified: float = 50.0) -> Figure:
+def registration_overlays(comparison: Comparison) -> Figure:
     """Outline of the simulated figure on each measured frame, with error ellipses at its corners."""
+    magnified = _magnification(comparison)
     margins = Margins(left=0.1, right=0.1, bottom=0.3, across=0.1, down=0.3)
     figure, axes = panels(len(comparison.outcomes), height=3.2, margins=margins)
     figure.set_facecolor(_DARK)
+    told = f"ellipses: 95 % regions, {magnified:g} times magnified"
+    figure.text(0.01, 0.01, told, color="white", fontsize=7.5)
     for plot, outcome in zip(axes, comparison.outcomes, strict=False):
         pair = outcome.pair
         top = brightest(pair)
@@ -122,6 +125,18 @@ def registration_overlays(comparison: Comparison, *, magnified: float = 50.0) ->
         plot.set_xlim(-0.5, pair.measured.shape[1] - 0.5)
         plot.set_ylim(pair.measured.shape[0] - 0.5, -0.5)
     return figure
+
+
+def _magnification(comparison: Comparison) -> float:
+    """Round number that makes the largest ellipse about a twelfth of a frame."""
+    sizes = [
+        float(np.max(outcome.pair.registration.corner_stderr_px)) / outcome.pair.measured.shape[1]
+        for outcome in comparison.outcomes
+        if np.isfinite(outcome.pair.registration.corner_stderr_px).all()
+    ]
+    largest = max(sizes, default=0.0)
+    offered = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
+    return next((times for times in offered if times * largest > 0.02), offered[-1])
 
 
 def _frame_with_ellipses(plot: Any, found: Registration, magnified: float) -> None:

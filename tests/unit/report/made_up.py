@@ -64,6 +64,7 @@ def context() -> Context:
             Entry("excess noise factor", 1.58, "", 0.05),
             Entry("frames used", 228),
             Entry("bad pixels", 23),
+            *(Entry("relative gain", (s / 700) ** 18, "", 0.01, setting=f"{s:g}") for s in (700.0, 740.0)),
         ),
         response=Curve(energy, level, 0.01 * level, "energy per pixel / J", "counts above dark"),
         gain=Curve(settings, gain, 0.01 * gain, "intensifier setting", "gain over the lowest setting"),

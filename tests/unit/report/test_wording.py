@@ -27,6 +27,8 @@ from imclab.report.wording import worded
         (7e-25, "1", None, "probability", "<\u202f0.001"),
         (0.99999, "1", None, "probability", ">\u202f0.999"),
         (0.25, "1", None, "probability", "0.250"),
+        (0.87112, "1", 0.0119, "compact", "0.871(12)"),
+        (44.882, "dB", 0.023, "compact", "44.882(23)"),
         (0.0, "1", 0.0, "plain", "0"),
         (3.2e-5, "1", None, "plain", "3.20·10⁻⁵"),
         (math.inf, "dB", 0.0, "plain", "∞"),
