@@ -50,7 +50,7 @@ def plan_table(plan: GatePlan) -> str:
     """Return the plan as a table."""
     values = plan_dict(plan)
     depth = plan.depth_m
-    rows = [(part.name, f"{float(part.time_ps) / 1e3:+.4f} ns") for part in plan.parts]
+    rows = [(part.name, f"{float(part.time_ps) / 1e3:+.4f} ns") for part in plan.parts if part.time_ps]
     rows += [
         ("delay wanted", f"{float(plan.wanted_delay_ps) / 1e3:.6f} ns"),
         (f"delay on the {plan.model.step_ps} ps grid", engineering_time(plan.delay_ps)),

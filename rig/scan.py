@@ -59,8 +59,8 @@ class ScanStep:
 def plan_scan(
     plan: GatePlan,
     *,
-    start: Quantity,
-    stop: Quantity,
+    start: Quantity | None = None,
+    stop: Quantity | None = None,
     step: Quantity | None = None,
     points: int | None = None,
     fineness: str = "coarse",
@@ -72,7 +72,8 @@ def plan_scan(
     plan : GatePlan
         The gate; its distance fixes what a delay means in range.
     start, stop, step : quantity
-        Distances (``"9 m"``) or delays (``"340 ns"``). A constant step in delay is one in range.
+        Distances (``"9 m"``) or delays (``"340 ns"``). A constant step in delay is one in range. Without
+        ``start`` or ``stop`` the sweep reaches twice the depth of field to that side of the plan's delay.
     points : int, optional
         How many steps, in the place of ``step``.
     fineness : {"coarse", "fine"}
@@ -83,7 +84,13 @@ def plan_scan(
     PlanError
         If the sweep has no points, or goes where a delay cannot be.
     """
-    first, last = _delay_at(plan, start, "start"), _delay_at(plan, stop, "stop")
+    reach_ps = 2 * (plan.pulse_ps + plan.width_ps)
+    first = (
+        max(plan.wanted_delay_ps - reach_ps, Fraction(0))
+        if start is None
+        else _delay_at(plan, start, "start")
+    )
+    last = plan.wanted_delay_ps + reach_ps if stop is None else _delay_at(plan, stop, "stop")
     if last < first:
         raise PlanError("scan", [Fault("stop", repr(stop), f"not before start = {start!r}")])
     grid = plan.model.step_ps

@@ -62,6 +62,8 @@ def set_gate(
     as_json: AsJson = False,
 ) -> None:
     """Program a gate and read it back; a dry run unless --live. It ends with the triggers off."""
+    if hold is not None and not arm:
+        raise typer.BadParameter("--hold is for how long to stay armed: --arm goes with it")
     box = _open(plan.model.name, port, live, limits, plan, baud=baud, journal=journal, timeout=timeout)
     with box:
         gate = box.apply(plan)
@@ -89,8 +91,13 @@ def set_gate(
 def scan(
     plan: rig.GatePlan,
     *,
-    start: Annotated[str, typer.Option("--from", help="First distance ('9 m') or delay ('340 ns').")],
-    stop: Annotated[str, typer.Option("--to", help="Last distance or delay.")],
+    start: Annotated[
+        str | None,
+        typer.Option("--from", help="First distance ('9 m') or delay; default just before the target."),
+    ] = None,
+    stop: Annotated[
+        str | None, typer.Option("--to", help="Last distance or delay; default just behind the target.")
+    ] = None,
     step: Annotated[str | None, typer.Option(help="Step in distance or delay.")] = None,
     points: Annotated[int | None, typer.Option(help="Number of steps, instead of --step.")] = None,
     fine: Annotated[bool, typer.Option("--fine", help="A sixth of the depth of field, not half.")] = False,

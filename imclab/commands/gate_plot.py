@@ -46,7 +46,7 @@ def timing_diagram(plan: GatePlan) -> Figure:
         f"programmed delay {plan.delay_ps / 1e3:.3f} ns", ((opens + trigger) / 2, -2.9), ha="center"
     )
     axes.set_yticks([0, -1, -2, -3], ["pulse", "return", "gate", plan.model.name])
-    axes.set_xlim(min(0.0, trigger) - pulse, max(opens + width, returns + pulse) + pulse)
+    axes.set_xlim(min(0.0, trigger) - pulse, 1.12 * max(opens + width, returns + pulse))
     axes.set_ylim(-3.6, 0.8)
     axes.set_xlabel("time after the pulse's leading edge enters the water (ns)")
     title = f"{plan.model.name} {plan.output}: {plan.convention}, {plan.convention_text}"

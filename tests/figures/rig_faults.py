@@ -1,7 +1,7 @@
 """Every fault against every job, on both families: what was right, recovered or reported.
 
 Run with ``python -m tests.figures.rig_faults``; a wrong value in silence stops it. The first part runs
-in this process on a virtual clock, twenty seeds of each case; the second over TCP in real time.
+in this process on a virtual clock, four seeds of each case; the second over TCP in real time.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from rig.simulator import FAULTS
 from tests.unit.rig.bad_line import generous_limits
 from tests.unit.rig.test_faults import JOBS, MODELS, outcomes_of
 
-SEEDS = 20
+SEEDS = 4
 KINDS = ("right", "recovered", "reported")
 
 

@@ -32,6 +32,14 @@ def test_distances_and_delays_say_the_same() -> None:
     assert nanoseconds.delays_ps == pytest.approx(metres.delays_ps, abs=5)
 
 
+def test_a_sweep_without_ends_goes_around_the_target() -> None:
+    plan = rig.plan_gate("40 m")
+    sweep = rig.plan_scan(plan)
+    assert sweep.delays_ps[0] == pytest.approx(plan.delay_ps - 15_000, abs=5)
+    assert plan.delay_ps + 15_000 <= sweep.delays_ps[-1] < plan.delay_ps + 15_000 + sweep.step_ps
+    assert rig.plan_scan(rig.plan_gate("9.5 m")).delays_ps[0] == 0
+
+
 def test_coarse_is_half_and_fine_a_sixth_of_the_depth_of_field() -> None:
     plan = rig.plan_gate("40 m")
     assert rig.plan_scan(plan, start="39 m", stop="41 m").step_ps == 2250
