@@ -112,6 +112,8 @@ class Session:
                 for line in self.dialect.opening_lines():
                     self._verified.send((line,), (), line)
                 self._verified.touched = False
+                for code in self.conversation.errors():  # left by others, or the first set would be blamed
+                    journal.write("note", f"found error {code}: {self.dialect.meaning_of_error(code)}")
             snapshot = self._verified.everything()
             self.inherited = snapshot.settings
             self._running = self.inherited["trigger_source"] != "off"

@@ -144,6 +144,14 @@ def test_a_late_reply_never_becomes_the_answer_to_another_question() -> None:
         assert box.conversation.recoveries >= 2
 
 
+def test_errors_left_by_others_are_not_blamed_on_the_first_set() -> None:
+    made = bench("dg645")
+    made.device.feed("BLAH")
+    with made.box as box:
+        assert box.apply(rig.plan_gate("40 m")).delay_ps == 277_115
+        assert box.errors() == []
+
+
 def test_a_power_cycle_is_noticed_not_overlooked() -> None:
     made = bench("dg645", limits=generous_limits("dg645"))
     with made.box as box:
