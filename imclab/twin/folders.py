@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from imclab.twin.camera import VirtualCamera
 
+METER_ERROR = 0.005  # relative standard error of each noted light level, as camera.toml says
 LABEL = "SYNTHETIC: made by `imclab twin`, not measured"
 
 
@@ -32,27 +33,40 @@ def write_calibration(
     shape = camera.flat.shape
     rows: list[dict[str, Any]] = []
 
-    def take(kind: str, setting: float, level: float | None, index: int, count: int) -> None:
+    def take(kind: str, setting: float, level: float, noted: str, index: int, count: int) -> None:
         file = f"{kind}_{setting:g}_{index:02d}.tif"
-        energy = np.full(shape, level or 0.0)
+        energy = np.full(shape, level)
         write_stack(folder / file, np.stack([camera.frame(energy, setting, rng) for _ in range(count)]))
-        written = "" if level is None else f"{level:.6e}"
-        rows.append({"file": file, "kind": kind, "energy_J": written, "gain": setting, "gate_ns": gate_ns})
+        rows.append({"file": file, "kind": kind, "energy_J": noted, "gain": setting, "gate_ns": gate_ns})
+
+    def noted(level: float) -> str:
+        """What the light meter reads, which is not quite the truth."""
+        return f"{level * (1.0 + METER_ERROR * rng.standard_normal()):.6e}"
 
     for setting in settings:
-        take("dark", setting, None, 0, 8)
-        take("flat", setting, camera.levels(setting, [0.45])[0], 0, 6)
+        take("dark", setting, 0.0, "", 0, 8)
+        even = camera.levels(setting, [0.45])[0]
+        take("flat", setting, even, noted(even), 0, 6)
     for index, level in enumerate(camera.levels(settings[0], np.geomspace(0.01, 1.6, 16))):
-        take("response", settings[0], level, index, 2)
+        take("response", settings[0], level, noted(level), index, 2)
     top = camera.gain_ratio(settings[-1]) / camera.gain_ratio(settings[0])
     for index, level in enumerate(camera.levels(settings[0], np.geomspace(0.05 / top, 0.7, 8))):
+        read = noted(level)  # one light level for all settings
         for setting in settings:
-            take("gain", setting, level, index, 2)
+            take("gain", setting, level, read, index, 2)
     with (folder / "frames.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, ["file", "kind", "energy_J", "gain", "gate_ns"])
         writer.writeheader()
         writer.writerows(rows)
-    text = tomli_w.dumps({"bit_depth": camera.chain.bit_depth, "wavelength": "532 nm"})
+    text = tomli_w.dumps(
+        {
+            "name": "virtual ICMOS (synthetic)",
+            "bit_depth": camera.chain.bit_depth,
+            "wavelength": f"{camera.chain.wavelength * 1e9:g} nm",
+            "gain_unit": "V",
+            "energy_stderr": METER_ERROR,
+        }
+    )
     (folder / "camera.toml").write_text(f"# {LABEL}\n{text}", encoding="utf-8")
 
 
