@@ -226,3 +226,25 @@ def test_known_gains_stand_in_for_unknown_levels(folder: Path) -> None:
     counts = np.array([400.0, 1200.0])
     energy = camera.energy(counts + SMALL.gray_offset, gain=700)[0]
     assert abs(energy[1] / energy[0] / 3.0 - 1.0) < 0.03
+
+
+def test_qe_is_printed_only_where_it_can_be_known(folder: Path) -> None:
+    with (folder / "camera.toml").open("a") as file:
+        file.write("excess_noise = 1.6\nexcess_noise_stderr = 0.1\n")
+    values = {figure.name: figure for figure in calibration.calibrate(folder).figures}
+    stated = values["QE with the stated F²"]
+    assert stated.value == pytest.approx(1.6 * values["QE/F² (excess noise not separable)"].value)
+    assert stated.systematic / stated.value >= 0.1 / 1.6
+    (folder / "camera.toml").write_text('bit_depth = 12\nwavelength = "532 nm"\nintensified = false\n')
+    bare = [figure.name for figure in calibration.calibrate(folder).figures]
+    assert "quantum efficiency QE" in bare and not any("F²" in name for name in bare)
+
+
+def test_stacks_in_one_piece_are_read_like_pages(folder: Path) -> None:
+    plain = calibration.calibrate(folder)
+    for row in rows(folder)[1:]:
+        stack = tifffile.imread(folder / row[0])
+        with tifffile.TiffWriter(folder / row[0], byteorder=">") as file:
+            for picture in stack:
+                file.write(picture, contiguous=True, photometric="minisblack")
+    assert calibration.calibrate(folder).relative_gain(750)[0] == pytest.approx(plain.relative_gain(750)[0])
