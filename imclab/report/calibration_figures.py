@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from calibration import Defect
+
 if TYPE_CHECKING:
     from calibration import Calibration
 
@@ -101,8 +103,10 @@ def maps_figure(camera: Calibration) -> Figure:
         )
         figure.colorbar(shown, ax=one, shrink=0.8)
         one.set_title(title, fontsize=9)
-    rows, columns = np.nonzero(camera.bad_pixels)
-    axes[2].scatter(columns, rows, c=camera.defects[rows, columns], s=6, cmap="tab10", vmin=0, vmax=9)
+    for defect in Defect:
+        rows, columns = np.nonzero(camera.defects & np.uint8(defect))
+        axes[2].plot(columns, rows, ".", ms=4, label=f"{rows.size} {(defect.name or '').lower()}")
+    axes[2].legend(fontsize=6, loc="upper right")
     axes[2].set(xlim=(0, camera.shape[1]), ylim=(camera.shape[0], 0), aspect="equal")
-    axes[2].set_title(f"{rows.size} bad pixels", fontsize=9)
+    axes[2].set_title(f"{int(camera.bad_pixels.sum())} bad pixels", fontsize=9)
     return figure
