@@ -51,7 +51,7 @@ def main() -> None:
     seconds: dict[str, list[float]] = {}
     bits = set()
     clusters = {
-        count: LocalCluster(n_workers=count, threads_per_worker=1, processes=True, dashboard_address=None)
+        count: LocalCluster(n_workers=count, threads_per_worker=1, processes=True, dashboard_address=":0")
         for count in (1, 2)
     }
     for (
