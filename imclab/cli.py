@@ -14,6 +14,7 @@ import click
 import typer
 
 import imclab
+from imclab.commands.bench import bench
 from imclab.commands.calibrate import calibrate
 from imclab.commands.gate import app as gate
 from imclab.commands.particles import particles
@@ -57,6 +58,7 @@ app.command("report")(report)
 app.command("twin")(twin)
 app.command("study")(study)
 app.command("sweep")(sweep)
+app.command("bench")(bench)
 app.add_typer(gate, name="gate")
 
 
