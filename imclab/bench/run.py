@@ -17,8 +17,6 @@ from imclab.scene import Scene
 from imclab.transport import simulate, transmit
 
 ESTIMATORS = ("analog", "expected", "two-sided", "auto")
-OPTICAL_DEPTHS = (0.1, 0.42, 1.42, 4.0, 10.0)
-PIXELS = (50, 100, 200, 400, 800)
 _LADDER = (0.25, 0.5, 1.0)
 
 __all__ = ["Bench", "BenchOptions", "WrongKernelError", "bench", "standard_scenes"]
@@ -26,12 +24,17 @@ __all__ = ["Bench", "BenchOptions", "WrongKernelError", "bench", "standard_scene
 
 @dataclass(frozen=True, kw_only=True)
 class BenchOptions:
-    """How much is measured: seconds of the longest run, of the reference, and how many seeds."""
+    """How much is measured: seconds of the longest run, of the reference, how many seeds, and where.
+
+    ``optical_depths`` and ``pixels`` (a side of the picture) are those of the cost tables.
+    """
 
     seconds: float = 2.0
     reference_seconds: float = 20.0
     seeds: int = 3
     seed: int = 1
+    optical_depths: tuple[float, ...] = (0.1, 0.42, 1.42, 4.0, 10.0)
+    pixels: tuple[int, ...] = (50, 100, 200, 400, 800)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,7 +106,7 @@ def bench(
         forward=_forward(base, options),
         threads=_threads(base, options),
         optical_depths=_depths(base, options),
-        pixels=[_cost(_with_pixels(base, n), options) | {"pixels": float(n)} for n in PIXELS],
+        pixels=[_cost(_with_pixels(base, n), options) | {"pixels": float(n)} for n in options.pixels],
         options=options,
     )
 
@@ -185,7 +188,7 @@ def _threads(scene: Scene, options: BenchOptions) -> list[dict[str, float]]:
 
 def _depths(scene: Scene, options: BenchOptions) -> list[dict[str, float]]:
     rows = []
-    for depth in OPTICAL_DEPTHS:
+    for depth in options.optical_depths:
         try:
             rows.append(_cost(with_optical_depth(scene, depth), options) | {"optical_depth": depth})
         except InputError:
