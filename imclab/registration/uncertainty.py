@@ -63,7 +63,7 @@ def leftover(model: Linearised, pixels: Pixels) -> Leftover:
     correlation = _auto_covariance(scaled, reach) / np.maximum(_auto_covariance(present, reach), 1.0)
     correlation /= max(float(correlation[reach, reach]), 1e-300)
     lag = np.arange(-reach, reach + 1)
-    correlation *= np.clip(1 - np.hypot(*np.meshgrid(lag, lag)) / (reach + 1), 0, 1)
+    correlation *= np.clip(2 - 2 * np.hypot(*np.meshgrid(lag, lag)) / (reach + 1), 0, 1)
     return Leftover(
         rows, cols, strength[rows, cols], correlation, variance * max(float(correlation.sum()), 1.0)
     )
@@ -74,7 +74,8 @@ def covariance(
 ) -> NDArray[np.float64]:
     """Covariance of the motion's parameters (in target units), blur and amplitudes projected out."""
     projected = model.projected_slopes()
-    information = (projected * model.weight) @ projected.T
+    # Huber's score bends where a residual is cut: its slope there is 0, not the weight.
+    information = (projected * (model.weight == 1.0)) @ projected.T
     score = _score_variance(projected * left.strength, left)
     if prior is not None:
         _, stiffness = prior.pull(model.state.matrix, reference.frame, len(information))
