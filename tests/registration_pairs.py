@@ -59,7 +59,7 @@ def draw_figure(rng: np.random.Generator, name: str, size: int = 200) -> NDArray
     canvas = np.zeros((size * FINE, size * FINE), np.uint8)
     unit = size * FINE / 200.0
     centre = np.array([100.0, 100.0]) + rng.uniform(-8, 8, 2)
-    length = rng.uniform(60, 105)
+    length = rng.uniform(80, 130)
     polygons = {"diver": _diver, "slit": _slit, "bars": _bars, "polygons": _polygons}[name](rng)
     for polygon in polygons:
         points = (centre + np.asarray(polygon) * length) * unit

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from imclab.registration.motion import Matrix, moved
 from imclab.registration.reference import Reference
 
-ROTATIONS_DEG = np.arange(-30.0, 31.0, 5.0)
-SCALE_STEP = 1.08
+ROTATIONS_DEG = np.arange(-32.0, 33.0, 6.4)
+SCALE_STEP = 1.1
 _SMALLEST_SCALE, _LARGEST_SCALE = 0.6, 1.65
 _TEMPLATE_RADIUS = 16.0
 """Radius of the target in the reduced pictures, in pixels."""
@@ -34,7 +34,7 @@ def candidates(reference: Reference, moving: NDArray[np.float64], *, count: int)
     rotation serves all scales, and larger scales cost less.
     """
     reduction = max(reference.frame.radius / _TEMPLATE_RADIUS, 1.0)
-    templates = [_template(reference, angle, reduction) for angle in ROTATIONS_DEG]
+    templates = _templates(reference, reduction)
     flat = _flattened(moving)
     largest = max(_LARGEST_SCALE, 1.15 * min(moving.shape) / min(reference.picture.shape))
     steps = int(np.ceil(np.log(largest / _SMALLEST_SCALE) / np.log(SCALE_STEP)))
@@ -44,35 +44,25 @@ def candidates(reference: Reference, moving: NDArray[np.float64], *, count: int)
     return _distinct(found, reference, count)
 
 
-def _template(reference: Reference, angle_deg: float, reduction: float) -> NDArray[np.float32]:
-    """Rotate and reduce the target's surroundings, with the target's centre in the middle."""
-    half = int(np.ceil(_extent(reference, angle_deg) / reduction)) + 3
-    turn = np.deg2rad(angle_deg)
-    inverse = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]) * reduction
-    centre = np.array([reference.frame.x, reference.frame.y])
-    matrix = np.column_stack([inverse, centre - inverse @ [half, half]])
-    soft = cv2.GaussianBlur(
-        _flattened(reference.picture), (0, 0), max(1.2, 0.6 * reduction), borderType=cv2.BORDER_REPLICATE
-    )
-    size = 2 * half + 1
-    return np.asarray(
-        cv2.warpAffine(
-            soft,
-            matrix,
-            (size, size),
-            flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,
-            borderMode=cv2.BORDER_REPLICATE,
-        )
-    )
-
-
-def _extent(reference: Reference, angle_deg: float) -> float:
+def _templates(reference: Reference, reduction: float) -> list[NDArray[np.float32]]:
+    """Rotate and reduce the target's surroundings, its centre in the middle, all of one size."""
+    frame = reference.frame
     y, x = np.nonzero(reference.target)
-    turn = np.deg2rad(angle_deg)
-    right, low = x - reference.frame.x, y - reference.frame.y
-    across = np.abs(np.cos(turn) * right - np.sin(turn) * low).max()
-    down = np.abs(np.sin(turn) * right + np.cos(turn) * low).max()
-    return float(max(across, down))
+    extent = max(
+        float(np.abs(np.cos(turn) * (x - frame.x) + np.sin(turn) * (y - frame.y)).max())
+        for turn in np.deg2rad([*ROTATIONS_DEG, *(ROTATIONS_DEG + 90)])
+    )
+    half = int(np.ceil(extent / reduction)) + 3
+    flat = _flattened(reference.picture)
+    soft = cv2.GaussianBlur(flat, (0, 0), max(1.2, 0.6 * reduction), borderType=cv2.BORDER_REPLICATE)
+    centre = np.array([frame.x, frame.y])
+    found = []
+    for turn in np.deg2rad(ROTATIONS_DEG):
+        inverse = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]]) * reduction
+        matrix = np.column_stack([inverse, centre - inverse @ [half, half]])
+        how = {"flags": cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP, "borderMode": cv2.BORDER_REPLICATE}
+        found.append(np.asarray(cv2.warpAffine(soft, matrix, (2 * half + 1, 2 * half + 1), **how)))
+    return found
 
 
 def _flattened(picture: NDArray[np.float64]) -> NDArray[np.float32]:
@@ -97,35 +87,32 @@ def _at_scale(
     size = (max(round(cols * shrink), 4), max(round(rows * shrink), 4))
     small = cv2.resize(flat, size, interpolation=cv2.INTER_AREA)
     ratio = np.array([cols / size[0], rows / size[1]])
+    half = templates[0].shape[0] // 2
+    padded = cv2.copyMakeBorder(small, half, half, half, half, cv2.BORDER_CONSTANT, value=0.0)
+    spread = _local_deviation(padded, templates[0].shape)
     found = []
-    for angle, template in zip(ROTATIONS_DEG, templates, strict=True):
-        half = template.shape[0] // 2
-        pad = half
-        wide = cv2.copyMakeBorder(small, pad, pad, pad, pad, cv2.BORDER_CONSTANT, value=0.0)
-        score = _correlation(wide, template)
+    for turn, template in zip(np.deg2rad(ROTATIONS_DEG), templates, strict=True):
+        score = cv2.matchTemplate(padded, template, cv2.TM_CCOEFF) / spread
         _, best, _, place = cv2.minMaxLoc(score)
-        middle = (np.array(place) + half - pad + 0.5) * ratio - 0.5
-        turn = np.deg2rad(angle)
+        middle = (np.array(place) + 0.5) * ratio - 0.5
         linear = scale * np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
         matrix = np.eye(3)
         matrix[:2, :2] = linear
         matrix[:2, 2] = middle - linear @ [reference.frame.x, reference.frame.y]
-        found.append(Candidate(matrix, float(best)))
+        found.append(Candidate(matrix, float(best) / (template.size * max(float(template.std()), 1e-30))))
     return found
 
 
-def _correlation(picture: NDArray[np.float32], template: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Normalised correlation, with a floor under the local variance so that empty places score low."""
-    rows, cols = template.shape
-    count = template.size
-    product = cv2.matchTemplate(picture, template, cv2.TM_CCOEFF)
-    mean = cv2.blur(picture, (cols, rows), borderType=cv2.BORDER_CONSTANT)
-    square = cv2.blur(picture * picture, (cols, rows), borderType=cv2.BORDER_CONSTANT)
-    top, left = rows // 2, cols // 2
-    here = (slice(top, top + product.shape[0]), slice(left, left + product.shape[1]))
-    variance = np.maximum(square - mean * mean, 0)[here] + 0.05 * float(picture.var()) + 1e-30
-    deviation = float(template.std()) + 1e-30
-    return np.asarray(product / (count * deviation * np.sqrt(variance)))
+def _local_deviation(picture: NDArray[np.float32], shape: tuple[int, ...]) -> NDArray[np.float32]:
+    """Standard deviation under a template everywhere, with a floor so that empty places score low."""
+    rows, cols = shape
+    box = [
+        cv2.blur(field, (cols, rows), borderType=cv2.BORDER_CONSTANT)
+        for field in (picture, picture * picture)
+    ]
+    variance = np.maximum(box[1] - box[0] * box[0], 0) + 0.05 * float(picture.var()) + 1e-30
+    inner = variance[rows // 2 : picture.shape[0] - rows // 2, cols // 2 : picture.shape[1] - cols // 2]
+    return np.asarray(np.sqrt(inner))
 
 
 def _distinct(found: list[Candidate], reference: Reference, count: int) -> list[Candidate]:

@@ -20,7 +20,7 @@ from imclab.registration.reference import Reference
 
 Vector = NDArray[np.float64]
 
-_HUBER = 1.5
+_HUBER = 3.0
 """Residuals beyond so many standard deviations count linearly."""
 _CONVERGED_PX = 2e-3
 _LONGEST_STEP_PX = 3.0

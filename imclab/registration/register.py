@@ -17,7 +17,7 @@ from imclab.registration.reference import Reference, prepare
 from imclab.registration.result import Registration
 from imclab.registration.uncertainty import Leftover, covariance, leftover
 
-_CANDIDATES = 4
+_CANDIDATES = 3
 _COARSE_RADIUS = 8.0
 """Radius of the target, in binned pixels, at which candidates are judged."""
 _MOST_PIXELS = 80_000

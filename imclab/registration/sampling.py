@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 _POLE = np.sqrt(3.0) - 2.0
 """Pole of the cubic B-spline's inverse filter (Unser, Aldroubi, Eden 1993)."""
-_REACH = 14
-"""Half width of that filter cut at 1e-8."""
+_REACH = 10
+"""Half width of that filter, cut at 2e-6."""
 
 
 def coefficients(picture: NDArray[np.float64], variance: float) -> NDArray[np.float64]:
