@@ -7,7 +7,7 @@ rather than give a wrong answer.
 
 from __future__ import annotations
 
-from imclab.registration.register import register
+from imclab.registration.procedure import register
 from imclab.registration.result import Registration
 
 __all__ = ["Registration", "register"]

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imclab.registration import sampling
-from imclab.registration.appearance import BACKGROUND, FULL, Fields, slopes, terms
+from imclab.registration.appearance import BACKGROUND, FULL, PLAIN, Fields, slopes, terms
 from imclab.registration.motion import Matrix, Prior, moved_back, stepped, velocities
 from imclab.registration.reference import Reference
 
@@ -24,7 +24,8 @@ _HUBER = 3.0
 """Residuals beyond so many standard deviations count linearly."""
 _CONVERGED_PX = 2e-3
 _LONGEST_STEP_PX = 3.0
-_LARGEST_BLUR = 100.0
+_LARGEST_BLUR = 0.25
+"""Of the target's radius: beyond this nothing of the figure is left to recognise."""
 
 
 class Pixels(NamedTuple):
@@ -68,6 +69,10 @@ class Linearised:
         """Weighted sum of squares of the residual."""
         return float(weight @ self.residual**2)
 
+    def mean_cost(self) -> float:
+        """Weighted mean square of the residual."""
+        return self.cost(self.weight) / self.weight.size
+
     def projected_slopes(self) -> Vector:
         """Return the slopes without what the amplitudes could explain."""
         coupling = _least_squares(self.linear, self.weight, self.slopes.T)
@@ -75,9 +80,7 @@ class Linearised:
 
     def explained(self, value: Vector) -> float:
         """Share of the frame's structure, beyond the background, that the figure explains."""
-        background = self.linear[:BACKGROUND]
-        rest = value - _least_squares(background, self.weight, value) @ background
-        return max(1 - self.cost(self.weight) / max(float(self.weight @ rest**2), 1e-300), 0.0)
+        return _explained(self.linear, self.weight, value)
 
 
 def choose_pixels(frame: Pixels, reference: Reference, matrix: Matrix) -> Pixels:
@@ -88,6 +91,20 @@ def choose_pixels(frame: Pixels, reference: Reference, matrix: Matrix) -> Pixels
     distance = reference.distance[y[near].round().astype(int), x[near].round().astype(int)]
     near[near] = distance < reference.margin
     return Pixels(frame.x[near], frame.y[near], frame.value[near], frame.width)
+
+
+def likeness(reference: Reference, pixels: Pixels, state: State) -> float:
+    """Share of the frame's structure beyond the background that the picture itself explains.
+
+    One amplitude: no halo, no tone, no illumination, which could imitate other structure. Negative
+    when the frame shows the reverse of the picture.
+    """
+    x, y = moved_back(state.matrix, pixels.x, pixels.y)
+    fields = _fields(reference, pixels, state.blur + pixels.width**2 / 12, x, y)
+    linear = terms(fields, PLAIN)[: BACKGROUND + 1]
+    weight = np.ones_like(pixels.value)
+    sign = np.sign(_least_squares(linear, weight, pixels.value)[-1])
+    return float(sign * _explained(linear, weight, pixels.value))
 
 
 def fit(
@@ -105,12 +122,13 @@ def fit(
         _linearised(reference, pixels, start, parameters, term_count, np.ones_like(pixels.value))
     )
     damping = 1e-3
+    largest = (_LARGEST_BLUR * reference.frame.radius) ** 2
     for _ in range(steps):
         step = _step(best, damping, reference, prior)
         reach = float(np.abs(step[:-1]).max()) * reference.frame.radius
         step = step * min(1.0, _LONGEST_STEP_PX / max(reach, 1e-12))
         blur = float(np.clip(best.state.blur + step[-1], 0.25 * best.state.blur, 4 * best.state.blur + 0.5))
-        state = State(stepped(best.state.matrix, step[:-1], reference.frame), min(blur, _LARGEST_BLUR))
+        state = State(stepped(best.state.matrix, step[:-1], reference.frame), min(blur, largest))
         trial = _linearised(reference, pixels, state, parameters, term_count, best.weight)
         if _objective(trial, best.weight, reference, prior) <= _objective(
             best, best.weight, reference, prior
@@ -163,6 +181,13 @@ def _least_squares(linear: Vector, weight: Vector, target: Vector) -> Vector:
     gram[np.diag_indices_from(gram)] *= 1 + 1e-9
     gram[np.diag_indices_from(gram)] += 1e-300
     return np.asarray(np.linalg.solve(gram, weighted @ target))
+
+
+def _explained(linear: Vector, weight: Vector, value: Vector) -> float:
+    background = linear[:BACKGROUND]
+    rest = value - _least_squares(background, weight, value) @ background
+    left = value - _least_squares(linear, weight, value) @ linear
+    return max(1 - float(weight @ left**2) / max(float(weight @ rest**2), 1e-300), 0.0)
 
 
 def _reweighted(model: Linearised) -> Linearised:

@@ -145,6 +145,11 @@ class Prior(NamedTuple):
         return gradient, stiffness
 
 
+def magnification(matrix: Matrix) -> float:
+    """Return pixels of the frame per pixel of the simulated picture."""
+    return float(np.sqrt(abs(np.linalg.det(matrix[:2, :2]))))
+
+
 def jacobian(matrix: Matrix, points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Derivative of the mapped points by the points (n, 2, 2)."""
     homogeneous = points @ matrix[:, :2].T + matrix[:, 2]

@@ -41,8 +41,11 @@ class Reference:
 
     @property
     def perspective(self) -> float:
-        """Standard deviation of the perspectives: 5 % in scale from the picture's centre to its rim."""
-        return 0.05 * self.frame.radius / (0.5 * float(np.sqrt(self.picture.size)))
+        """Standard deviation of the perspectives: 4 % in scale from the picture's centre to its rim.
+
+        A target of 5 cm seen from 1 m and tilted by 45 degrees changes by 2.5 %.
+        """
+        return 0.04 * self.frame.radius / (0.5 * float(np.sqrt(self.picture.size)))
 
     @property
     def margin(self) -> float:

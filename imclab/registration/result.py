@@ -28,8 +28,8 @@ class Registration:
     reason : str
         Why not; empty when ok.
     quality : float
-        Share of the frame's structure, beyond its background, that the moved picture explains
-        (0 to 1, noise included).
+        Share of the frame's structure, beyond its background, that the moved and blurred picture
+        explains with one amplitude, on coarse pixels: 1 is all; negative for a reversed picture.
     contrast : float
         Strength of the target in the frame, in standard deviations of the noise.
     covariance : float64 array (k, k), read-only
