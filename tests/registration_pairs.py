@@ -99,6 +99,24 @@ def target_free_frame(seed: int, shape: tuple[int, int] = (256, 320)) -> NDArray
     )
 
 
+def decoy_frames(seed: int) -> dict[str, NDArray[np.generic]]:
+    """Frames that show something, but not the target of pair ``seed``."""
+    rng = np.random.default_rng([seed, 5])
+    rows, cols = 200, 200
+    v, u = np.mgrid[:rows, :cols]
+    speckle = _blur(rng.normal(size=(rows, cols)).astype(np.float32), rng.uniform(2, 12))
+    spot = 40 * np.exp(-((u - 100) ** 2 + (v - 90) ** 2) / 2 / rng.uniform(20, 80) ** 2)
+    fringes = 20 * np.sin(u / rng.uniform(4, 20) + v / rng.uniform(6, 30))
+    return {
+        "empty water": target_free_frame(seed),
+        "noise": rng.normal(100, 10, (rows, cols)),
+        "fringes": 100 + fringes + rng.normal(0, 5, (rows, cols)),
+        "speckle": 100 + 10 * speckle / speckle.std() + rng.normal(0, 4, (rows, cols)),
+        "beam spot": 100 + u * rng.uniform(-0.3, 0.3) + 0.2 * v + spot + rng.normal(0, 3, (rows, cols)),
+        "another target": make_pair(seed, band="small", target=TARGETS[(seed + 1) % 4]).moving,
+    }
+
+
 def _binned(fine: NDArray[np.float32], factor: int = FINE) -> NDArray[np.float32]:
     rows, cols = fine.shape
     return fine.reshape(rows // factor, factor, cols // factor, factor).mean(axis=(1, 3))

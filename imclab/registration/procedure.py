@@ -23,7 +23,7 @@ _COARSE_RADIUS = 8.0
 """Radius of the target, in binned pixels, at which candidates are judged."""
 _MOST_PIXELS = 80_000
 """Above this the frame is binned once more: edges that are blurred over pixels lose nothing."""
-_FEWEST_PIXELS = 150
+_FEWEST_PIXELS = 80
 _SMALLEST_SIDE = 24
 
 
@@ -38,7 +38,7 @@ def register(fixed: ArrayLike, moving: ArrayLike, model: str = "similarity") -> 
         The raw measured frame, of any size. Pixels that are not finite are left out.
     model : str
         "translation", "euclidean", "similarity", "affine", "homography", or "auto" for the simplest
-        of them that explains the frame (Akaike's criterion on independent pixels).
+        of them that explains the frame (Schwarz's criterion, with the noise of independent pixels).
 
     Returns
     -------
@@ -146,7 +146,7 @@ def _refined(reference: Reference, pyramid: _Pyramid, start: State, model: str) 
     for width, steps in ((2 * finest, 10), (finest, 4), (finest, 8)):
         pixels = choose_pixels(pyramid.pixels(width), reference, state.matrix)
         if pixels.x.size < _FEWEST_PIXELS:
-            return None
+            continue
         fitted = fit(reference, pixels, state, parameters=count, steps=steps, prior=prior)
         state = fitted.state
         left = leftover(fitted, pixels)
@@ -156,14 +156,15 @@ def _refined(reference: Reference, pyramid: _Pyramid, start: State, model: str) 
 
 
 def _simplest(reference: Reference, pyramid: _Pyramid, start: State) -> str:
-    """Choose the motion by Akaike's criterion, counting independent pixels only."""
+    """Choose the motion by Schwarz's criterion, with the noise of independent pixels."""
     results = {model: _refined(reference, pyramid, start, model) for model in PARAMETERS}
     freest = results["homography"]
     if freest is None:
         return "similarity"
     noise = freest.left.noise
     scores = {
-        model: freest.pixels.x.size * found.model.mean_cost() / noise + 2 * PARAMETERS[model]
+        model: freest.pixels.x.size * found.model.mean_cost() / noise
+        + np.log(freest.pixels.x.size) * PARAMETERS[model]
         for model, found in results.items()
         if found is not None
     }
