@@ -139,6 +139,7 @@ def _resampled(
     from scipy.ndimage import map_coordinates
 
     rows, cols = picture.shape
-    values = map_coordinates(picture, [y, x], order=3, mode="nearest")
+    order = 3 if np.isfinite(picture).all() else 1  # a spline would spread one NaN everywhere
+    values = map_coordinates(picture, [y, x], order=order, mode="nearest")
     inside = (x >= -0.5) & (x <= cols - 0.5) & (y >= -0.5) & (y <= rows - 0.5)
     return np.where(inside, values, fill)
