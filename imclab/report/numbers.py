@@ -30,7 +30,8 @@ def document(
     """Return everything the report says, ready for JSON.
 
     A number is ``{"value": ..., "unit": ...}``, perhaps with ``stderr`` (standard uncertainty, same
-    unit); the unit of a pure number is "1". What is not finite is null, with a ``flag``.
+    unit), ``dof`` (its degrees of freedom, when few) and ``interval_95``; the unit of a pure number
+    is "1". What is not finite is null, with a ``flag``.
     """
     return {
         "schema": 1,
@@ -73,7 +74,9 @@ def _finite(value: float) -> float | int | None:
 
 
 def _estimate(estimate: Estimate, unit: str = "1") -> Document:
-    return quantity(estimate.value, unit, estimate.stderr)
+    told = quantity(estimate.value, unit, estimate.stderr)
+    told["interval_95"] = [_finite(end) for end in estimate.interval]
+    return told | ({"dof": estimate.dof} if math.isfinite(estimate.dof) else {})
 
 
 def _array(values: Any, unit: str) -> Document:
@@ -161,7 +164,7 @@ def _condition(outcome: Outcome, seen: Detail, context: Context) -> Document:
         "pixels": quantity(int(pair.region.sum()), "1"),
         "measured_ratio": _estimate(outcome.measured_ratio),
         "simulated_ratio": _estimate(outcome.simulated_ratio),
-        "error": quantity(error.value, "1", error.u_val),
+        "error": _estimate(Estimate(error.value, error.u_val, error.dof)),
         "error_over_uncertainty": quantity(error.value / error.u_val if error.u_val else math.nan, "1"),
         "uncertainty": quantity(error.u_val, "1"),
         "probability_inside": quantity(error.probability_inside, "1"),

@@ -23,7 +23,6 @@ from imclab.report.detail import detail
 from imclab.report.figures import all_figures
 from imclab.report.numbers import Document, document
 from imclab.report.wording import worded
-from imclab.uncertainty import COVERAGE_95
 
 VERDICT_KINDS = {
     "agrees within its uncertainty": "good",
@@ -63,6 +62,10 @@ def render(comparison: Comparison, folder: str | Path, *, context: Context) -> P
         When the folder may not be written to.
     """
     folder = Path(folder)
+    try:
+        (folder / "figures").mkdir(exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot be written ({error.strerror or error})") from error
     whole = agreement(comparison)
     details = [detail(outcome.pair, data_range=comparison.data_range) for outcome in comparison.outcomes]
     numbers = document(comparison, context, agreement=whole, details=details)
@@ -74,12 +77,8 @@ def render(comparison: Comparison, folder: str | Path, *, context: Context) -> P
     drawn = all_figures(comparison, context, agreement=whole, details=details, comment=comment)
     files = {file_name(name): data for name, data in drawn.items()}
     for outcome, views in zip(comparison.outcomes, shown, strict=True):
-        files |= {file_name(f"{outcome.pair.name} {view}"): data for view, data in views.items()}
+        files |= {file_name(f"{outcome.pair.name}-{view}"): data for view, data in views.items()}
     html = _page(numbers, shown, drawn)
-    try:
-        (folder / "figures").mkdir(exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot be written ({error.strerror or error})") from error
     for name, data in files.items():
         with written_whole(folder / "figures" / name) as temporary:
             temporary.write_bytes(data)
@@ -94,8 +93,8 @@ def render(comparison: Comparison, folder: str | Path, *, context: Context) -> P
 
 
 def file_name(name: str) -> str:
-    """Return the file name of a figure: words joined by dashes."""
-    return f"{re.sub(r'[^A-Za-z0-9.+_]+', '-', name).strip('-')}.png"
+    """Return the file name of a figure; what a file system may not like becomes a dash."""
+    return re.sub(r"[^\w .+-]", "-", name) + ".png"
 
 
 def at(numbers: Document, pointer: str) -> Any:
@@ -153,16 +152,15 @@ def _size(png: bytes, scale: float) -> Markup:
 def _glyph(condition: Document) -> Markup:
     """Draw an error with its 95 % interval between -45 and +45 % and the bound; for the eye alone."""
     error, bound = condition["error"], condition["bound"]["value"]
-    half = COVERAGE_95 * (error["stderr"] or 0.0)
 
     def place(value: float) -> str:
         return f"{55 + 52 * min(max(value / 0.45, -1.0), 1.0):.1f}"
 
-    low, middle, high = (place(error["value"] + shift) for shift in (-half, 0.0, half))
+    low, high = (place(end) for end in error["interval_95"])
     return Markup(
         '<svg class="glyph" viewBox="0 0 110 16" aria-hidden="true">'
         '<line class="axis" x1="55" x2="55" y1="1" y2="15"/>'
         '<line class="bound" x1="{left}" x2="{left}" y1="1" y2="15"/>'
         '<line class="bound" x1="{right}" x2="{right}" y1="1" y2="15"/>'
         '<line class="range" x1="{low}" x2="{high}" y1="8" y2="8"/><circle cx="{middle}" cy="8" r="3"/></svg>'
-    ).format(left=place(-bound), right=place(bound), low=low, high=high, middle=middle)
+    ).format(left=place(-bound), right=place(bound), low=low, high=high, middle=place(error["value"]))

@@ -39,7 +39,7 @@ def all_figures(
             "calibration": calibration(context),
         }
         for outcome, seen in zip(comparison.outcomes, details, strict=True):
-            figures[f"sharpness {outcome.pair.name}"] = sharpness(outcome, seen)
+            figures[f"sharpness-{outcome.pair.name}"] = sharpness(outcome, seen)
         files = {}
         for name, figure in figures.items():
             if figure is not None:

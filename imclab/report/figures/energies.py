@@ -20,7 +20,7 @@ from imclab.report.figures.style import (
     new_figure,
     plain_numbers,
 )
-from imclab.uncertainty import COVERAGE_95
+from imclab.uncertainty import coverage_factor
 
 
 def energy_curve(comparison: Comparison) -> Figure:
@@ -41,7 +41,7 @@ def energy_curve(comparison: Comparison) -> Figure:
         lower.errorbar(
             depth + shift,
             [100 * outcome.error.value for outcome in group],
-            [100 * COVERAGE_95 * outcome.error.u_val for outcome in group],
+            [100 * coverage_factor(outcome.error.dof) * outcome.error.u_val for outcome in group],
             fmt=marker,
             color=SIMULATED,
             markersize=5,
@@ -117,7 +117,7 @@ def _points(axes: Any, x: NDArray[np.float64], estimates: Sequence[Any], **style
     axes.errorbar(
         x,
         [estimate.value for estimate in estimates],
-        [COVERAGE_95 * estimate.stderr for estimate in estimates],
+        [estimate.interval[1] - estimate.value for estimate in estimates],
         linestyle="none",
         markersize=5.5,
         elinewidth=1.1,

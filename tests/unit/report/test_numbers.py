@@ -50,7 +50,9 @@ def test_every_number_has_a_unit_and_json_can_hold_it(made: Comparison) -> None:
 def test_values_are_those_of_the_comparison(made: Comparison) -> None:
     numbers = numbers_of(made)
     for outcome, told in zip(made.outcomes, numbers["conditions"], strict=True):
+        low, high = told["error"].pop("interval_95")
         assert told["error"] == {"value": outcome.error.value, "unit": "1", "stderr": outcome.error.u_val}
+        assert high - low == pytest.approx(2 * 1.959964 * outcome.error.u_val, rel=1e-6)
         assert told["metrics"]["psnr"]["unit"] == "dB"
         assert told["speed"]["packets"]["value"] == outcome.pair.result.packets
         shares = [part["share"]["value"] for part in told["budget"].values()]
