@@ -1,6 +1,7 @@
 """Expected estimator: walks from the laser that score the chance of reaching the aperture.
 
-Works with every surface and every receiver. Light that no water scatters is not left to chance: from
+Works with every surface and every receiver. Backscatter is joined from the camera's side, because next
+events see its forward peaks too seldom. Light that no water scatters is not left to chance: from
 diffuse surfaces it is computed by quadrature, from glossy ones each pixel is sampled in turn.
 """
 
@@ -10,11 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imclab.optics.surface import MICROFACET
+from imclab.transport.backscatter_walk import backscatter_walks, peak_angle
 from imclab.transport.direct_light import coverage_of, direct_light, rules_for
-from imclab.transport.next_event import mirror_light, next_event_walks
+from imclab.transport.next_event import DIFFUSE_LAST, mirror_light, next_event_walks
 from imclab.transport.picture_grid import PictureGrid, picture_grid
 from imclab.transport.runner import Estimator, Tally
 from imclab.transport.setup import PULSE_REACH, Setup
+from imclab.transport.smooth_map import smooth_map
 
 FloatArray = NDArray[np.float64]
 
@@ -29,17 +32,19 @@ def make(setup: Setup) -> Estimator:
     if setup.time.bins:
         exact["time"] = direct.times
     latest = setup.gate.closes + PULSE_REACH * setup.gate.sigma
-    glossy = glossy_share(setup, grid)
+    glossy, veil, peak = glossy_share(setup, grid), smooth_map(setup), peak_angle(setup)
     scatters = setup.water.scattering > 0.0
 
     def batch(seed: int, first_history: int, count: int) -> Tally:
-        pictures, times = np.zeros((2, *grid.shape)), np.zeros(setup.time.bins)
+        target, times = np.zeros(grid.shape), np.zeros(setup.time.bins)
+        backscatter = np.zeros(veil.shape)
         run = (np.uint64(seed), np.uint64(first_history), count)
         if scatters:
-            next_event_walks(setup, False, latest, *run, pictures, times)
+            next_event_walks(setup, DIFFUSE_LAST, latest, *run, target, times)
+            backscatter_walks(setup, peak, latest, veil.tents, *run, backscatter, times)
         if glossy.any():
-            mirror_light(setup, glossy, *run, pictures[1], times)
-        tally = {"backscatter": pictures[0], "target": pictures[1]}
+            mirror_light(setup, glossy, *run, target, times)
+        tally = {"backscatter": veil.picture(backscatter), "target": target}
         return tally | {"time": times} if setup.time.bins else tally
 
     return Estimator("expected", batch, BATCH_SIZE, exact, left_out(setup))

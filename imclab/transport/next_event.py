@@ -96,13 +96,13 @@ def _vertex_value(setup: Any, point: Any, incoming: Any, on_target: Any, leaving
 
 @cached_kernel
 def next_event_walks(
-    setup: Any, glossy_only: bool, latest: float, seed: Any, first: Any, count: int, pictures: Any, times: Any
+    setup: Any, least: int, latest: float, seed: Any, first: Any, count: int, picture: Any, times: Any
 ) -> None:
-    """Add the scores of ``count`` packets: pictures[0] backscatter, pictures[1] target light.
+    """Add the scores of ``count`` packets to the picture of target light.
 
     Light that goes from laser to target to aperture unscattered is left out: it has its own ways
-    (`direct_light`, `mirror_light`). With ``glossy_only`` only light is scored that has met a glossy
-    surface on the target last.
+    (`direct_light`, `mirror_light`). Scored is light whose last meeting with the target ranks at least
+    as ``least``: `DIFFUSE_LAST` for all of it, `GLOSSY_LAST` for that of glossy surfaces.
     """
     water, target, receiver = setup.water, setup.target, setup.receiver
     mean_free_path = 1.0 / max(water.attenuation, 1e-30)
@@ -145,8 +145,7 @@ def next_event_walks(
                 direction = turn(incoming, deviation, math.sin(angle), math.cos(angle))
                 factor = water.albedo
                 order += 1
-            scored = (order > 0) and (met == GLOSSY_LAST or not glossy_only)
-            part = pictures[min(met, 1)]
+            scored = order > 0 and met >= least
             if scored:
                 u_radius, u_angle, _, _ = uniforms(seed, history, event, NEXT_EVENT_STREAM + 1)
                 leaving, distance, even = _way_to_aperture(receiver, point, u_radius, u_angle)
@@ -154,7 +153,7 @@ def next_event_walks(
                     value, drawn = _vertex_value(setup, point, incoming, on_target, leaving)
                     energy = weight * value / (even + drawn) * math.exp(-water.attenuation * distance)
                     energy *= 1.0 if on_target else water.albedo
-                    _gather(setup, part, times, (point, leaving), energy, path + distance)
+                    _gather(setup, picture, times, (point, leaving), energy, path + distance)
             weight *= factor
             if weight == 0.0:
                 break
@@ -163,7 +162,7 @@ def next_event_walks(
                 if distance > 0.0:
                     _, drawn = _vertex_value(setup, point, incoming, on_target, direction)
                     energy = weight * drawn / (even + drawn) * math.exp(-water.attenuation * distance)
-                    _gather(setup, part, times, (point, direction), energy, path + distance)
+                    _gather(setup, picture, times, (point, direction), energy, path + distance)
             if weight < ROULETTE_WEIGHT:
                 if dice > ROULETTE_CHANCE:
                     break

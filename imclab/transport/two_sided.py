@@ -25,7 +25,7 @@ from imclab.transport.camera_walk import camera_walks
 from imclab.transport.direct_light import coverage_of, direct_light, rules_for
 from imclab.transport.expected import glossy_share, left_out
 from imclab.transport.light_walk import LightMaps, MapAxes, light_walks
-from imclab.transport.next_event import mirror_light, next_event_walks
+from imclab.transport.next_event import GLOSSY_LAST, mirror_light, next_event_walks
 from imclab.transport.picture_grid import picture_grid
 from imclab.transport.runner import Estimator, Tally
 from imclab.transport.setup import PULSE_REACH, Setup
@@ -76,7 +76,7 @@ def make(setup: Setup) -> Estimator:
 
     def batch(seed: int, first_history: int, count: int) -> Tally:
         cells, backscatter = np.zeros_like(coverage), np.zeros(veil.shape)
-        pictures, times = np.zeros((2, *grid.shape)), np.zeros(setup.time.bins)
+        mirrored, times = np.zeros(grid.shape), np.zeros(setup.time.bins)
         run = (np.uint64(seed), np.uint64(first_history), count)
         if scatters and diffuse:
             maps = light_maps(setup, axes, swung, latest, run)
@@ -94,10 +94,10 @@ def make(setup: Setup) -> Estimator:
             backscatter *= count / max(few, 1)
             times += veiled * (count / max(few, 1))
         if scatters and shiny:
-            next_event_walks(setup, True, latest, *run, pictures, times)
+            next_event_walks(setup, GLOSSY_LAST, latest, *run, mirrored, times)
         if shiny:
-            mirror_light(setup, glossy, *run, pictures[1], times)
-        tally = {"target": grid.pixels(cells) + pictures[1], "backscatter": veil.picture(backscatter)}
+            mirror_light(setup, glossy, *run, mirrored, times)
+        tally = {"target": grid.pixels(cells) + mirrored, "backscatter": veil.picture(backscatter)}
         return tally | {"time": times} if setup.time.bins else tally
 
     return Estimator("two-sided", batch, BATCH_SIZE, exact, left_out(setup))

@@ -1,0 +1,86 @@
+"""All estimators give the same answer, and a wrong medium is found out by the same comparison."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import imclab
+from imclab.result import Result
+from imclab.scene import Scene
+from tests.imaging_scenes import CENTRED, SCENES, scene
+from tests.judging import threshold, z_of
+
+PACKETS = {"analog": 600_000, "expected": 200_000, "two-sided": 40_000}
+COMPARISONS = len(SCENES) * 4
+DEGREES = 31  # every run has at least 32 batches
+
+
+def estimate(of: Scene, estimator: str, seed: int = 1) -> Result:
+    return imclab.simulate(of, estimator=estimator, packets=PACKETS[estimator], seed=seed, time_bins=0)
+
+
+def differences(first: Result, second: Result, parts: tuple[str, ...]) -> list[float]:
+    """Z of the totals of two results."""
+    return [
+        float(
+            z_of(
+                getattr(first, part),
+                getattr(first, f"{part}_stderr"),
+                getattr(second, part),
+                getattr(second, f"{part}_stderr"),
+            )
+        )
+        for part in parts
+    ]
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_estimators_agree(name: str) -> None:
+    """Rationale: three ways to the same integral. Expected: totals differ by chance alone."""
+    results = {estimator: estimate(SCENES[name], estimator) for estimator in PACKETS}
+    truth = results["analog"]
+    z = []
+    for estimator in ("expected", "two-sided"):
+        z += differences(results[estimator], truth, ("total", "target_total"))
+    exact = [result.total_stderr == 0.0 for result in results.values()]
+    assert not all(exact)
+    assert np.max(np.abs(z)) < threshold(COMPARISONS, degrees=DEGREES), (name, z)
+
+
+@pytest.mark.parametrize("wrong", [{"albedo": 0.89 * 0.98}, {"g": 0.904}], ids=["albedo", "g"])
+def test_wrong_medium_is_rejected(wrong: dict[str, float]) -> None:
+    """The same comparison at depth 4: an albedo 2 % off, or g 0.02 off, does not pass."""
+    right, other = scene(4.0, side=0.4), scene(4.0, side=0.4, **wrong)
+    truth = imclab.simulate(right, estimator="analog", packets=4_000_000, seed=2, time_bins=0)
+    same = imclab.simulate(right, estimator="two-sided", packets=100_000, seed=3, time_bins=0)
+    off = imclab.simulate(other, estimator="two-sided", packets=100_000, seed=3, time_bins=0)
+    limit = threshold(COMPARISONS, degrees=DEGREES)
+    assert abs(differences(same, truth, ("target_total",))[0]) < limit
+    assert abs(differences(off, truth, ("target_total",))[0]) > limit
+
+
+def test_backscatter_agrees_where_it_is_strong() -> None:
+    """The analog estimator has hits enough of backscatter in open, turbid water; a sign of g off has not."""
+    turbid = {"c": 4.0, "g": 0.6, "aperture": 0.1, "side": 0.4}
+    truth = imclab.simulate(scene(**turbid), estimator="analog", packets=1_000_000, seed=2, time_bins=0)
+    same = imclab.simulate(scene(**turbid), estimator="two-sided", packets=60_000, seed=3, time_bins=0)
+    off = imclab.simulate(
+        scene(**turbid | {"g": 0.5}), estimator="two-sided", packets=60_000, seed=3, time_bins=0
+    )
+    limit = threshold(2, degrees=DEGREES)
+    assert abs(differences(same, truth, ("backscatter_total",))[0]) < limit
+    assert abs(differences(off, truth, ("backscatter_total",))[0]) > limit
+
+
+def test_pixels_and_times_agree() -> None:
+    """Pixels and time bins of expected and two-sided agree too, each within its own errors."""
+    of = scene(1.42, gate=CENTRED, pixels=3)
+    first = imclab.simulate(of, estimator="expected", packets=1_000_000, seed=4, time_bins=16)
+    second = imclab.simulate(of, estimator="two-sided", packets=100_000, seed=5, time_bins=16)
+    pixels = z_of(first.energy, first.energy_stderr, second.energy, second.energy_stderr)
+    assert np.abs(pixels).max() < threshold(pixels.size, degrees=DEGREES)
+    assert first.time_energy is not None and second.time_energy is not None
+    assert first.time_stderr is not None and second.time_stderr is not None
+    bins = z_of(first.time_energy, first.time_stderr, second.time_energy, second.time_stderr)
+    assert np.abs(bins).max() < threshold(bins.size, degrees=DEGREES)
