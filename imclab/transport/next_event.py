@@ -29,6 +29,8 @@ from imclab.transport.surfaces import sample as sample_surface
 NEXT_EVENT_STREAM = 41
 MIRROR_STREAM = 45
 
+_SHARPEST = 1e200
+
 UNTOUCHED, DIFFUSE_LAST, GLOSSY_LAST = 0, 1, 2
 """What light has met on the target last."""
 
@@ -87,6 +89,8 @@ def _vertex_value(setup: Any, point: Any, incoming: Any, on_target: Any, leaving
     if not on_target:
         x, y, z = incoming[0] - leaving[0], incoming[1] - leaving[1], incoming[2] - leaving[2]
         value = phase_density(setup.phase, min(0.5 * (x * x + y * y + z * z), 2.0))
+        if not value < _SHARPEST:  # straight on or straight back alone: no number at that one angle
+            value = _SHARPEST
         return value, value
     surface = surface_at(setup.target, point)
     w_in = (-incoming[0], -incoming[1], incoming[2])

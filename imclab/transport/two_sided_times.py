@@ -23,6 +23,7 @@ def scattered_times(setup: Setup, axes: MapAxes, arriving: FloatArray, seen: Flo
     both = fftconvolve(arriving, seen, axes=1).sum(axis=(0, 2))
     moment = axes.impulse_start + axes.times[0] + np.arange(both.size) * axes.impulse_width
     place = (moment - setup.time.start) / setup.time.width - 0.5
+    place = np.clip(place, -2.0, setup.time.bins + 1.0)  # an early gate lies far from all light
     low = np.floor(place).astype(np.int64)
     times = np.zeros(setup.time.bins)
     for bins, share in ((low, low + 1.0 - place), (low + 1, place - low)):

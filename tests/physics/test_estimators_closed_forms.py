@@ -14,8 +14,8 @@ from imclab.transport.setup import setup_of
 from tests.imaging_scenes import CENTRED, scene
 
 
-def lambert_return(reflectance: float, distance: float, half_side: float, radius: float, *, sigma: float) -> float:
-    reflectance: float, distance: float, half_side: float, radius: float, sigma: float
+def lambert_return(
+    reflectance: float, distance: float, half_side: float, radius: float, *, sigma: float
 ) -> float:
     """Integrate the clear-water return of a coaxial Lambertian square by Gauss rules of its own.
 
