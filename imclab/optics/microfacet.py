@@ -100,8 +100,7 @@ class Microfacet(Material):
         """Return the share of the light arriving at ``cos_in`` that is sent back, by quadrature.
 
         Gauss quadrature of `evaluate` over the slopes of the facets, cut where the law has kinks: it
-        does not use `sample` or `density`. Error below 1e-7, for
-        roughness 1 at grazing incidence below 1e-4.
+        does not use `sample` or `density`. Error below 1e-7.
 
         Parameters
         ----------
@@ -109,24 +108,11 @@ class Microfacet(Material):
             Cosine of the angle of incidence, above 0 and at most 1.
         """
         check("cos_in", cos_in, 0.0, 1.0, open_low=True)
-        sine = np.sqrt((1.0 - cos_in) * (1.0 + cos_in))
-        w_in = np.array([sine, 0.0, cos_in])
-        # Out to 7 roughnesses, where D is below 1e-21 of its peak. At a given slope the kinks lie where
-        # w_out turns horizontal, where the second wall of the V-cavity comes to light, and where
-        # shadowing begins; the cuts in slope are where these azimuths reach 0 or 180 degrees.
-        reach, incidence = 7.0 * self.roughness, np.arctan2(sine, cos_in)
-        corners = np.array([0.0, np.pi / 4 - incidence / 2, np.pi / 4 + incidence / 2, np.pi / 2 - incidence])
-        thirds = np.array([np.pi / 6 - incidence / 3, np.pi / 6 + incidence / 3, np.pi / 2])
-        cuts = np.sort(np.minimum(np.tan(np.concatenate((corners, thirds))), reach))
-        slope, slope_weight = _gauss_between(cuts, 128)
-        square = slope * slope
-        level = np.stack(
-            (square - 1.0, np.full_like(slope, 2.0), 2.0 * (3.0 * square - 1.0) / (3.0 - square))
-        )
-        with np.errstate(divide="ignore"):
-            kinks = np.arccos(np.clip(0.5 * level * cos_in / (slope * max(sine, 1e-300)), -1.0, 1.0))
-        cuts = np.sort(np.concatenate((np.zeros((1, slope.size)), kinks, np.full((1, slope.size), np.pi))), 0)
-        azimuth, azimuth_weight = _gauss_between(cuts, 32)
+        incidence = np.arctan2(np.sqrt((1.0 - cos_in) * (1.0 + cos_in)), cos_in)
+        w_in = np.array([np.sin(incidence), 0.0, cos_in])
+        # Out to 7 roughnesses, where D is below 1e-21 of its peak.
+        slope, slope_weight = _gauss_between(_slope_cuts(incidence, 7.0 * self.roughness), 128)
+        azimuth, azimuth_weight = _gauss_between(_azimuth_cuts(slope, incidence), 32)
         tangent = np.broadcast_to(slope, azimuth.shape)
         cos_normal = 1.0 / np.sqrt(1.0 + tangent * tangent)
         normal = np.stack((tangent * np.cos(azimuth), tangent * np.sin(azimuth), np.ones_like(tangent)), -1)
@@ -181,12 +167,41 @@ def paper_equation_8(w_in: ArrayLike, w_out: ArrayLike, *, index: complex) -> Ar
     return np.where(facet.lit, value, 0.0)
 
 
+def _azimuth_cuts(slope: Array, incidence: float) -> Array:
+    """Azimuths from 0 to pi, for every slope, between which the law is smooth; along axis 0.
+
+    Its kinks lie where w_out turns horizontal, where the second wall of the V-cavity comes to light,
+    where shadowing begins, and where cos_out = cos_in.
+    """
+    square = slope * slope
+    shadow = 2.0 * (3.0 * square - 1.0) / (3.0 - square)
+    level = np.stack((square - 1.0, np.full_like(slope, 2.0), shadow, 2.0 * square))
+    with np.errstate(over="ignore"):
+        cosine = 0.5 * level * np.cos(incidence) / np.maximum(slope * np.sin(incidence), 1e-300)
+    kinks = np.arccos(np.clip(cosine, -1.0, 1.0))
+    return np.sort(
+        np.concatenate((np.zeros((1, slope.size)), kinks, np.full((1, slope.size), np.pi))), axis=0
+    )
+
+
+def _slope_cuts(incidence: float, reach: float) -> Array:
+    """Slopes from 0 to ``reach`` at which a kink of `_azimuth_cuts` comes or goes."""
+    third, half = incidence / 3.0, incidence / 2.0
+    tilts = [0.0, np.pi / 4 - half, np.pi / 4 + half, np.pi / 2 - incidence]
+    tilts += [np.pi / 6 - third, np.pi / 6 + third, incidence, np.pi / 2]
+    return np.sort(np.minimum(np.tan(tilts), reach))
+
+
 def _gauss_between(cuts: Array, points: int) -> tuple[Array, Array]:
-    """Gauss points and weights of every interval between cuts along axis 0, joined along axis 0."""
+    """Points and weights of every interval between cuts along axis 0, joined along axis 0.
+
+    Gauss points, gathered toward both ends of the interval as those of a sine, because the integrand
+    has roots and thin layers there.
+    """
     nodes, weights = np.polynomial.legendre.leggauss(points)
+    angle = 0.25 * np.pi * (1.0 + nodes)
     shape = (1, points) + (1,) * (cuts.ndim - 1)
-    half = 0.5 * (cuts[1:] - cuts[:-1])[:, None]
-    middle = 0.5 * (cuts[1:] + cuts[:-1])[:, None]
-    position = middle + half * nodes.reshape(shape)
-    weight = half * weights.reshape(shape)
+    start, length = cuts[:-1][:, None], np.diff(cuts, axis=0)[:, None]
+    position = start + length * (np.sin(angle) ** 2).reshape(shape)
+    weight = length * (0.25 * np.pi * weights * np.sin(2.0 * angle)).reshape(shape)
     return position.reshape(-1, *cuts.shape[1:]), weight.reshape(-1, *cuts.shape[1:])

@@ -9,7 +9,8 @@ Symbols: theta scattering angle in rad, ``s = 1 - mu``, F the probability below 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,24 +26,75 @@ _LAST_ANGLE_MAY_MISS = np.radians(10.0)
 
 
 @dataclass(frozen=True, eq=False)
+class _PowerLaws:
+    """A curve over the scattering angle made of power laws, from one angle above 0 to 180 degrees.
+
+    ``slope`` is the power below the first angle.
+    """
+
+    theta: Array
+    value: Array
+    slope: float
+
+    @cached_property
+    def powers(self) -> Array:
+        """Power of the angle in every interval."""
+        return np.asarray(np.diff(np.log(self.value)) / np.diff(np.log(self.theta)))
+
+    @cached_property
+    def below(self) -> Array:
+        """Integral over the sphere from 0 to each angle."""
+        pieces = self._inside(np.arange(self.powers.size), self.theta[1:])
+        return np.cumsum(np.concatenate((self._pole(self.theta[:1]), pieces)))
+
+    def at(self, theta: Array) -> Array:
+        """Value at each angle."""
+        interval = self._interval(theta)
+        power = np.where(theta < self.theta[0], self.slope, self.powers[interval])
+        ratio = np.maximum(theta, 1e-30) / self.theta[interval]
+        return np.asarray(self.value[interval] * ratio**power)
+
+    def integral(self, theta: Array) -> Array:
+        """Integral over the sphere from 0 to each angle."""
+        first, interval = self.theta[0], self._interval(theta)
+        beyond = self.below[interval] + self._inside(interval, np.maximum(theta, first))
+        return np.where(theta < first, self._pole(np.minimum(theta, first)), beyond)
+
+    def _interval(self, theta: Array) -> NDArray[np.int64]:
+        return np.clip(np.searchsorted(self.theta, theta, side="right") - 1, 0, self.powers.size - 1)
+
+    def _pole(self, theta: Array) -> Array:
+        """Integral to angles within the first: in theta**(2 + slope) what remains is sin(x) / x."""
+        exponent = 2.0 + self.slope
+        share = (0.5 * (1.0 + _NODES)) ** (1.0 / exponent)
+        sinc = np.sinc(theta[..., None] * share / np.pi) @ (0.5 * _WEIGHTS)
+        scale = 2.0 * np.pi * self.value[0] * self.theta[0] ** 2 / exponent
+        return np.asarray(scale * (theta / self.theta[0]) ** exponent * sinc)
+
+    def _inside(self, interval: NDArray[np.int64], theta: Array) -> Array:
+        """Integral from the start of each interval to an angle in it."""
+        start = self.theta[interval]
+        half = 0.5 * (theta - start)
+        points = (start + half)[..., None] + half[..., None] * _NODES
+        power = self.powers[interval][..., None]
+        law = self.value[interval][..., None] * (points / start[..., None]) ** power
+        return np.asarray(2.0 * np.pi * half * ((law * np.sin(points)) @ _WEIGHTS))
+
+
+@dataclass(frozen=True, eq=False)
 class Tabulated(PhaseFunction):
     """A phase function given by its values at some angles.
 
     Parameters
     ----------
     angles : array_like
-        Scattering angles in rad, strictly increasing, from 0 or above to 170 degrees or above.
+        Scattering angles in rad, strictly increasing, from 0 or above to 170 degrees or above. A value
+        at 0 holds up to a tenth of the next angle.
     values : array_like
         Values there, positive, in any unit; they are normalised.
     forward_slope : float, optional
         Power of the angle below the first one, above -2; the slope between the first two when left
-        out.
-
-    Attributes
-    ----------
-    scale : float
-        What the values were divided by: the integral of the table over the sphere. For a volume
-        scattering function in 1/(m sr) it is the scattering coefficient.
+        out, none if the first angle is 0.
 
     Raises
     ------
@@ -53,91 +105,49 @@ class Tabulated(PhaseFunction):
     angles: ArrayLike
     values: ArrayLike
     forward_slope: float | None = None
-    scale: float = field(init=False)
 
     def __post_init__(self) -> None:
         theta = np.array(self.angles, dtype=np.float64)
         value = np.array(self.values, dtype=np.float64)
         _check_table(theta, value)
-        # The power law needs a first angle above 0; a value at 0 holds up to a tenth of the next angle.
+        for name, array in (("angles", theta), ("values", value)):
+            array.flags.writeable = False
+            object.__setattr__(self, name, array)
+        if not self._curve.slope > -2.0:
+            wanted = "a slope above -2: a steeper pole has no finite integral"
+            raise refuse("slope toward 0 degrees", f"{self._curve.slope:.3g}", wanted)
+
+    @cached_property
+    def _curve(self) -> _PowerLaws:
+        theta, value = np.array(self.angles), np.array(self.values)
+        own_slope = 0.0
         if theta[0] == 0.0:
             theta[0] = 0.1 * theta[1]
-            slope = 0.0 if self.forward_slope is None else self.forward_slope
         else:
-            steps = np.log(value[:2]), np.log(theta[:2])
-            own = float((steps[0][1] - steps[0][0]) / (steps[1][1] - steps[1][0]))
-            slope = own if self.forward_slope is None else self.forward_slope
-        if not slope > -2.0:
-            wanted = "a slope above -2: a steeper pole has no finite integral"
-            raise refuse("slope toward 0 degrees", f"{slope:.3g}", wanted)
+            own_slope = float(np.log(value[1] / value[0]) / np.log(theta[1] / theta[0]))
         if theta[-1] < np.pi:
             theta, value = np.append(theta, np.pi), np.append(value, value[-1])
-        self._set(theta, value, slope)
+        return _PowerLaws(theta, value, own_slope if self.forward_slope is None else self.forward_slope)
 
-    def _set(self, theta: Array, value: Array, slope: float) -> None:
-        between = np.diff(np.log(value)) / np.diff(np.log(theta))
-        for array in (theta, value, between):
-            array.flags.writeable = False
-        attributes = {"_theta": theta, "_value": value, "_between": between, "_slope": slope}
-        for name, content in attributes.items():
-            object.__setattr__(self, name, content)
-        # The cumulative integral at the angles of the table, before normalisation.
-        object.__setattr__(self, "scale", 1.0)
-        object.__setattr__(self, "_below", np.zeros(theta.size))
-        first = self._pole(theta[:1])
-        pieces = self._inside(np.arange(theta.size - 1), theta[1:])
-        below = np.concatenate((first, first + np.cumsum(pieces)))
-        object.__setattr__(self, "scale", float(below[-1]))
-        object.__setattr__(self, "_below", below)
+    @property
+    def scale(self) -> float:
+        """Integral of the table over the sphere, by which the values are divided.
 
-    _theta: Array = field(init=False, repr=False)
-    _value: Array = field(init=False, repr=False)
-    _between: Array = field(init=False, repr=False)
-    _below: Array = field(init=False, repr=False)
-    _slope: float = field(init=False, repr=False)
-
-    def _curve(self, theta: Array) -> Array:
-        """Table before normalisation at angles in rad."""
-        interval = np.clip(np.searchsorted(self._theta, theta, side="right") - 1, 0, self._between.size - 1)
-        power = np.where(theta < self._theta[0], self._slope, self._between[interval])
-        ratio = np.maximum(theta, 1e-30) / self._theta[interval]
-        return np.asarray(self._value[interval] * ratio**power)
-
-    def _pole(self, theta: Array) -> Array:
-        """Integral from 0 to angles within the first: power law times sin(theta), the pole taken out."""
-        exponent = 2.0 + self._slope
-        share = (0.5 * (1.0 + _NODES)) ** (1.0 / exponent)
-        sinc = np.sinc(theta[..., None] * share / np.pi) @ (0.5 * _WEIGHTS)
-        first = self._theta[0]
-        power = self._value[0] * first**2 * (theta / first) ** exponent / exponent
-        return np.asarray(2.0 * np.pi * power * sinc)
-
-    def _inside(self, interval: NDArray[np.int64], theta: Array) -> Array:
-        """Integral from the start of each interval to an angle in it."""
-        start = self._theta[interval]
-        half = 0.5 * (theta - start)
-        points = (start + half)[..., None] + half[..., None] * _NODES
-        law = (
-            self._value[interval][..., None]
-            * (points / start[..., None]) ** self._between[interval][..., None]
-        )
-        return np.asarray(2.0 * np.pi * half * ((law * np.sin(points)) @ _WEIGHTS))
+        For a volume scattering function in 1/(m sr) it is the scattering coefficient.
+        """
+        return float(self._curve.below[-1])
 
     def density(self, s: Array) -> Array:
         """Phase function in 1/sr at ``s = 1 - mu``."""
-        return self._curve(_angle(s)) / self.scale
+        return self._curve.at(_angle(s)) / self.scale
 
     def forward_probability(self, s: Array) -> Array:
         """Probability of ``1 - mu'`` at most s."""
-        theta = np.minimum(_angle(s), np.pi)
-        interval = np.clip(np.searchsorted(self._theta, theta, side="right") - 1, 0, self._between.size - 1)
-        inside = self._below[interval] + self._inside(interval, np.maximum(theta, self._theta[0]))
-        value = np.where(theta < self._theta[0], self._pole(np.minimum(theta, self._theta[0])), inside)
-        return np.asarray(value / self.scale)
+        return self._curve.integral(_angle(s)) / self.scale
 
     def backward_probability(self, r: Array) -> Array:
         """Probability of ``1 + mu'`` at most r."""
-        return np.asarray(1.0 - self.forward_probability(2.0 - np.asarray(r, dtype=np.float64)))
+        return 1.0 - self.forward_probability(2.0 - np.asarray(r, dtype=np.float64))
 
 
 def _angle(s: ArrayLike) -> Array:
