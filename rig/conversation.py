@@ -123,7 +123,8 @@ class Conversation:
         self.journal.write("note", f"resynchronise: {reason}")
 
     def _fence(self) -> Line:
-        assert self.identity is not None
+        if self.identity is None:
+            raise LinkError(f"{self.link.name}: not open; wanted box.open() or a with block")
         return Line("*IDN?", re.compile(re.escape(self.identity.text)))
 
     def _blocks(self, queries: Sequence[Line]) -> Iterator[list[Line]]:

@@ -105,8 +105,7 @@ class Generator(Session):
         ReadBackError
             If the box does not hold the applied plan at this delay, or fires when it should not.
         """
-        assert self._plan is not None, "apply a plan first"
-        wanted = {"delay": delay_ps, "width": self._plan.width_ps}
+        wanted = {"delay": delay_ps, "width": self._applied_plan().width_ps}
         held = {name: self.read(name) for name in wanted}
         running = self.read("trigger_source") != "off"
         if held != wanted or running != self._running:
@@ -143,8 +142,7 @@ class Generator(Session):
         then_trigger : str, optional
             What to arm again afterwards; without it the triggers stay off.
         """
-        if self._plan is None:
-            raise PlanError("move", [Fault("gate", "none", "an applied plan", "Call apply first.")])
+        plan = self._applied_plan()
         wanted = self._property("delay", None)
         native = wanted.domain.native(Fraction(delay_ps, 10**12), wanted.where)
         self._check_setting(wanted, wanted.domain.shown(native))
@@ -153,7 +151,7 @@ class Generator(Session):
         again = self._running
         source = self._property("trigger_source", None)
         width = self._property("width", None)
-        held = (width, width.domain.native(Fraction(self._plan.width_ps, 10**12), width.where))
+        held = (width, width.domain.native(Fraction(plan.width_ps, 10**12), width.where))
         applied = self._verified.set(
             wanted,
             delay_ps,
@@ -209,6 +207,11 @@ class Generator(Session):
         check_plan(plan.with_delay(first_ps), self.dialect, self.limits)
         check_plan(plan.with_delay(last_ps), self.dialect, self.limits)
         refuse("gate plan", self.dialect.conflicts(self.inherited, plan.output, first_ps, last_ps))
+
+    def _applied_plan(self) -> GatePlan:
+        if self._plan is None:
+            raise PlanError("gate", [Fault("plan", "none", "an applied plan", "Call apply first.")])
+        return self._plan
 
     def _check_setting(self, wanted: Property, shown: Any) -> None:
         if self._read_only:

@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import sqrt
 
-from rig import path
+from rig import delay_parts
+from rig.delay_parts import PS, SPEED_OF_LIGHT, Part
 from rig.errors import Fault, PlanError
 from rig.models import Model, model_named, output_named
-from rig.path import PS, SPEED_OF_LIGHT, Part
 from rig.quantity import Quantity, engineering_time, exact, nearest
 
 _FWHM_PER_SIGMA = 2.354820045
@@ -204,14 +204,14 @@ def plan_gate(
     """
     box = model_named(model)
     shortest = Fraction(max(box.shortest_width_ps, 3000), PS)
-    width_s = shortest if width is None else path.positive(width, "time", "width", zero=False)
-    pulse_s = path.positive(pulse, "time", "pulse", zero=False)
-    index = path.index_of_water(water, group_index, temperature, salinity, wavelength)
-    shift, sentence = path.convention_shift(convention, pulse_s, width_s, tail_delay)
+    width_s = shortest if width is None else delay_parts.positive(width, "time", "width", zero=False)
+    pulse_s = delay_parts.positive(pulse, "time", "pulse", zero=False)
+    index = delay_parts.index_of_water(water, group_index, temperature, salinity, wavelength)
+    shift, sentence = delay_parts.convention_shift(convention, pulse_s, width_s, tail_delay)
     if offset is not None:
         fixed: tuple[Part, ...] = (Part("calibrated offset", exact(offset, "time", name="offset") * PS),)
     else:
-        fixed = path.electronics(
+        fixed = delay_parts.electronics(
             box,
             cable_in=cable_in,
             cable_out=cable_out,
@@ -225,12 +225,12 @@ def plan_gate(
         )
     metres: Fraction | None = None
     if distance is not None and delay is None:
-        metres = path.positive(distance, "length", "distance", zero=False)
+        metres = delay_parts.positive(distance, "length", "distance", zero=False)
         light = (Part(_ROUND_TRIP, 2 * index * metres / SPEED_OF_LIGHT * PS), Part(_CONVENTION, shift * PS))
         parts = (*light, *fixed)
         wanted = sum((part.time_ps for part in parts), Fraction(0))
     elif delay is not None and distance is None:
-        wanted = path.positive(delay, "time", "delay") * PS
+        wanted = delay_parts.positive(delay, "time", "delay") * PS
         parts, convention, sentence = fixed, "delay", "the delay was given as such"
     else:
         came = "neither" if delay is None else "both"
@@ -250,11 +250,11 @@ def plan_gate(
         pulse_ps=pulse_s * PS,
         convention=convention,
         convention_text=sentence,
-        jitter_ps=sqrt(float(path.positive(jitter, "time", "jitter") * PS) ** 2 + box.jitter_ps**2),
+        jitter_ps=sqrt(float(delay_parts.positive(jitter, "time", "jitter") * PS) ** 2 + box.jitter_ps**2),
         uncertainty_ps=unsure,
         uncertainty_source=source,
         trigger=trigger.replace("-", " ").replace("_", " ").lower(),
-        rate_hz=None if rate is None else path.positive(rate, "rate", "rate", zero=False),
+        rate_hz=None if rate is None else delay_parts.positive(rate, "rate", "rate", zero=False),
         polarity=polarity,
         amplitude=amplitude,
         notes=_notes(box, insertion, offset),
@@ -276,7 +276,7 @@ def calibrated_offset(
 
     ``delay`` is the programmed delay at which the return sat in the gate as the convention says.
     """
-    metres = path.positive(distance, "length", "distance", zero=False)
+    metres = delay_parts.positive(distance, "length", "distance", zero=False)
     light = 2 * exact(group_index, "number", name="group_index") * metres / SPEED_OF_LIGHT
     return (
         exact(delay, "time", name="delay") - light - exact(convention_shift, "time", name="convention_shift")
@@ -288,7 +288,9 @@ def _uncertainty(box: Model, offset: Quantity | None, given: Quantity | None) ->
         if offset is None:
             fault = Fault("offset_uncertainty", repr(given), "an offset with it")
             raise PlanError("gate plan", [fault])
-        return float(path.positive(given, "time", "offset_uncertainty") * PS), "of the calibrated offset"
+        return float(
+            delay_parts.positive(given, "time", "offset_uncertainty") * PS
+        ), "of the calibrated offset"
     if offset is not None:
         return 0.0, "not given with the calibrated offset"
     return float(box.accuracy_ps), "the generator's accuracy alone; calibrate on a target at known range"

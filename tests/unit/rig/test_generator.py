@@ -21,6 +21,8 @@ def test_nothing_is_opened_before_the_with_block() -> None:
     box = rig.open_generator("socket://127.0.0.1:1", model="dg645")
     with pytest.raises(rig.LinkError, match="not open"):
         _ = box.identity
+    with pytest.raises(rig.LinkError, match="not open"):
+        box.read("delay")
     with pytest.raises(rig.LinkError, match="opening failed"):
         box.open()
 
