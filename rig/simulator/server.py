@@ -73,7 +73,7 @@ class SimulatorServer:
         self.received = bytearray()
         self._byte_s = 0.0 if baud is None else 10.0 / baud
         self._symlink = None if symlink is None else Path(symlink)
-        self._selector = selectors.DefaultSelector()
+        self._selector = selectors.SelectSelector()  # epoll rounds its waits up to whole milliseconds
         self._events: list[tuple[float, int, Callable[[], None]]] = []
         self._order = itertools.count()
         self._connections: dict[socket.socket, _Line] = {}
@@ -230,7 +230,7 @@ class SimulatorServer:
         os.set_blocking(ours, False)
         self._pty = (ours, theirs)  # theirs stays open, or reading ours fails between two clients
         self.pty_name = os.ttyname(theirs)
-        line = _Line(self.device, lambda data: _write_all(ours, data), lambda: self.unplug(0.5))
+        line = _Line(self.device, lambda data: _write_or_lose(ours, data), lambda: self.unplug(0.5))
         self._selector.register(ours, selectors.EVENT_READ, lambda: self._read_pty(ours, line))
         if self._symlink is not None:
             self._symlink.unlink(missing_ok=True)
@@ -255,18 +255,18 @@ class SimulatorServer:
         for byte in data:
             line.input_free = max(now, line.input_free) + self._byte_s
             for command in line.splitter.take(bytes([byte])):
-                self._at_time(line.input_free, functools.partial(self._obey, line, command))
+                self._at_time(line.input_free, functools.partial(self._obey, line, command, line.input_free))
         if line.splitter.overflowed:
             line.splitter.overflowed = False
             self.device.complain(171)
 
-    def _obey(self, line: _Line, command: str) -> None:
+    def _obey(self, line: _Line, command: str, heard: float) -> None:
+        """Run a command and send its reply, timed from when its last byte had come, however late it is."""
         for chunk in self.faults.run(command):
-            self._reply(line, chunk)
+            self._reply(line, chunk, heard)
 
-    def _reply(self, line: _Line, chunk: Chunk) -> None:
-        now = time.monotonic()
-        begin = (now if chunk.out_of_order else max(now, line.output_free)) + chunk.pause_s
+    def _reply(self, line: _Line, chunk: Chunk, heard: float) -> None:
+        begin = (heard if chunk.out_of_order else max(heard, line.output_free)) + chunk.pause_s
         end = begin + len(chunk.data) * self._byte_s
         if not chunk.out_of_order:
             line.output_free = end
@@ -310,7 +310,7 @@ def _address(text: str) -> tuple[str, int]:
     return host or "127.0.0.1", int(port)
 
 
-def _write_all(file: int, data: bytes) -> None:
-    while data:
-        with contextlib.suppress(BlockingIOError):
-            data = data[os.write(file, data) :]
+def _write_or_lose(file: int, data: bytes) -> None:
+    """Write to a pty; what does not fit because nobody reads is lost, as on a wire."""
+    with contextlib.suppress(BlockingIOError):
+        os.write(file, data)
