@@ -116,6 +116,8 @@ def scan(
     as_json: AsJson = False,
 ) -> None:
     """Sweep the gate over a range, every step read back; a dry run unless --live."""
+    if out is not None and not out.parent.is_dir():
+        raise typer.BadParameter(f"-o {out}: the folder {out.parent} is not there; make it first")
     sweep = rig.plan_scan(
         plan, start=start, stop=stop, step=step, points=points, fineness="fine" if fine else "coarse"
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rig import GatePlan
+from rig import Fault, GatePlan, PlanError
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -55,7 +55,17 @@ def timing_diagram(plan: GatePlan) -> Figure:
 
 
 def save_timing_diagram(plan: GatePlan, path: Path) -> None:
-    """Draw the diagram into a file; its ending says the format."""
+    """Draw the diagram into a file; its ending says the format.
+
+    Raises
+    ------
+    PlanError
+        If no picture has that ending.
+    """
+    formats = ("png", "pdf", "svg")
+    if path.suffix.removeprefix(".").lower() not in formats:
+        wanted = " or ".join(f"a name ending in .{ending}" for ending in formats)
+        raise PlanError("timing diagram", [Fault("--plot", repr(str(path)), wanted)])
     part = path.with_name(f".{path.stem}.part{path.suffix}")
     timing_diagram(plan).savefig(part, dpi=150)
     part.replace(path)

@@ -85,6 +85,15 @@ def test_the_diagram_is_drawn(capsys: pytest.CaptureFixture[str], tmp_path: Path
     assert len(list(tmp_path.iterdir())) == 1
 
 
+def test_outputs_that_cannot_be_written_are_told_beforehand(
+    capsys: pytest.CaptureFixture[str], box: SimulatorServer, tmp_path: Path
+) -> None:
+    assert ".png" in gate(capsys, "plan", "--distance", "40 m", "--plot", str(tmp_path / "gate"), code=2)
+    words = ["scan", "--distance", "40 m", "-o", str(tmp_path / "no" / "steps.csv"), *live(box, tmp_path)]
+    assert "make it first" in gate(capsys, *words, code=2)
+    assert box.received == b""
+
+
 def test_a_dry_run_is_the_default_and_needs_no_port(
     capsys: pytest.CaptureFixture[str], box: SimulatorServer
 ) -> None:
