@@ -77,13 +77,21 @@ def transmit(
     check_threads(threads)
     water, phase = water_of(scene)
     beam, sigma = beam_of(scene, water.refractive_index), pulse_sigma(scene)
+    # the pulse's length, and the detour of the beam's outer rays
+    delay_scale = sigma * water.group_velocity + planes[-1] * min(beam.divergence_sigma, 1.0) ** 2
     estimator, sampled_share = oneway.make(
-        water, phase, beam, planes=planes.tolist(), delay_scale=sigma * water.group_velocity
+        water, phase, beam, planes=planes.tolist(), delay_scale=delay_scale
     )
     ledger = GroupLedger(estimator.exact, sampled_share=sampled_share, stop_at="moments")
     effort = run(estimator, ledger, until, seed=used_seed, threads=threads, progress=progress)
 
-    quantities = _quantities(planes, sigma, water.group_velocity, oneway.radial_scale_of(beam, planes[-1]))
+    quantities = _quantities(
+        planes,
+        sigma,
+        water.group_velocity,
+        radial_scale=oneway.radial_scale_of(beam, planes[-1]),
+        delay_scale=delay_scale,
+    )
     value, stderr = ledger.jackknife(quantities)
     fields = {}
     for name, column, error in zip(_COLUMNS, value.T, stderr.T, strict=True):
@@ -128,13 +136,16 @@ _COLUMNS = (
 
 
 def _quantities(
-    planes: FloatArray, sigma: float, group_velocity: float, radial_scale: float
+    planes: FloatArray, sigma: float, group_velocity: float, *, radial_scale: float, delay_scale: float
 ) -> Callable[[Tally], FloatArray]:
     """Return the function that turns means per packet into the quantities, shape (planes, quantities)."""
-    from imclab.transport.oneway import radial_edges
+    from imclab.transport.oneway import delay_edges, radial_edges
     from imclab.transport.widths import pulse_fwhm, spot_fwhm
 
     edges = radial_edges(radial_scale)
+    # the last bin has no end; what lies in it, far behind the pulse, is left out of the width
+    bin_sigma = np.diff(delay_edges(delay_scale)[:-1]) / (math.sqrt(12.0) * group_velocity)
+    smeared = np.hypot(sigma, bin_sigma)
     count = planes.size
 
     def quantities(means: Tally) -> FloatArray:
@@ -145,14 +156,15 @@ def _quantities(
             returned, _, returned_path, _ = back[k]
             mean_excess = excess / weight if weight > 0.0 else math.nan
             variance = excess_square / weight - mean_excess**2 if weight > 0.0 else math.nan
-            delays, shares = _delays(means["delay"][k])
+            shares, paths = means["delay"][k]
+            delays = paths / np.where(shares > 0.0, shares, 1.0) / group_velocity
             rows.append(
                 [
                     weight,
                     returned,
                     spot_fwhm(edges, means["radial"][k]),
                     math.sqrt(square / weight) if weight > 0.0 else math.nan,
-                    pulse_fwhm(delays / group_velocity, shares, sigma),
+                    pulse_fwhm(delays[:-1], shares[:-1], smeared),
                     math.sqrt(sigma**2 + max(variance, 0.0) / group_velocity**2),
                     distance + mean_excess,
                     returned_path / returned if returned > 0.0 else math.nan,
@@ -161,10 +173,3 @@ def _quantities(
         return np.array(rows)
 
     return quantities
-
-
-def _delays(histogram: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the mean path of each bin that holds energy, m, and that energy."""
-    shares, paths = histogram
-    held = shares > 0.0
-    return paths[held] / shares[held], shares[held]

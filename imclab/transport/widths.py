@@ -74,36 +74,50 @@ def _smooth(irradiance: FloatArray, area: FloatArray, radius: FloatArray, width:
     return np.asarray((energy[high] - energy[low]) / (areas[high] - areas[low]))
 
 
-def pulse_fwhm(delay: FloatArray, weight: FloatArray, sigma: float) -> float:
+def pulse_fwhm(delay: FloatArray, weight: FloatArray, sigma: FloatArray) -> float:
     """Return the full width at half maximum of a Gaussian pulse smeared by delays, s.
 
     Parameters
     ----------
     delay, weight : array (n)
-        Delays, s, and the energy that has each.
-    sigma : float
-        Standard deviation of the pulse, s.
+        Delays, s, rising, and the energy that has each.
+    sigma : array (n)
+        Standard deviation of the pulse, s, with which each delay arrives: that of the laser's pulse, and
+        of the bin that the delay stands for.
+
+    Returns
+    -------
+    float
+        Between the crossings of the half maximum next to the highest point; NaN when nothing arrived.
     """
     present = weight > 0.0
-    delay, weight = delay[present], weight[present]
-    if not weight.size:
+    delay, height, sigma = delay[present], weight[present] / sigma[present], sigma[present]
+    if not height.size:
         return np.nan
 
     def power(time: float) -> float:
-        return float(weight @ np.exp(-0.5 * ((time - delay) / sigma) ** 2))
+        return float(height @ np.exp(-0.5 * ((time - delay) / sigma) ** 2))
 
     # the delays that carry the energy; the far tail does not move the half maximum
-    bulk = np.interp([0.001, 0.999], np.cumsum(weight) / weight.sum(), delay)
-    grid = np.linspace(bulk[0] - 3.0 * sigma, bulk[1] + 3.0 * sigma, 301)
-    profile = np.exp(-0.5 * ((grid[:, None] - delay) / sigma) ** 2) @ weight
-    top = int(np.argmax(profile))
-    # a parabola through the three highest points places the maximum to 1e-6 of sigma
+    energy = np.cumsum(height * sigma)
+    first, last = np.searchsorted(energy, [0.001 * energy[-1], 0.999 * energy[-1]])
+    start, end = delay[first] - 5.0 * sigma[first], delay[last] + 5.0 * sigma[last]
+    points = int(np.clip((end - start) / (0.1 * sigma[first]), 301, 3001))
+    grid = np.linspace(start, end, points)
+    profile = np.exp(-0.5 * ((grid[:, None] - delay) / sigma) ** 2) @ height
+    top = int(np.clip(np.argmax(profile), 1, points - 2))
+    # a parabola through the three highest points places the maximum between them
     before, here, after = profile[top - 1 : top + 2]
-    peak_time = grid[top] + 0.5 * (grid[1] - grid[0]) * (before - after) / (before - 2.0 * here + after)
+    bend = before - 2.0 * here + after
+    peak_time = grid[top] + (0.5 * (grid[1] - grid[0]) * (before - after) / bend if bend < 0.0 else 0.0)
     half = 0.5 * power(peak_time)
-    left = grid[np.flatnonzero(profile[:top] < half)[-1]]
-    right = grid[top + np.flatnonzero(profile[top:] < half)[0]]
-    return float(
-        brentq(lambda t: power(t) - half, peak_time, right, xtol=1e-12 * sigma)
-        - brentq(lambda t: power(t) - half, left, peak_time, xtol=1e-12 * sigma)
-    )
+    left = grid[np.append(0, np.flatnonzero(profile[:top] < half))[-1]]
+    right = grid[np.append(top + np.flatnonzero(profile[top:] < half), points - 1)[0]]
+    step = 1e-10 * (end - start)
+    ends = [
+        brentq(lambda t: power(t) - half, *sorted((peak_time, side)), xtol=step)
+        if power(side) < half
+        else side
+        for side in (left, right)
+    ]
+    return float(ends[1] - ends[0])
