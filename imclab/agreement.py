@@ -113,7 +113,12 @@ class Agreement:
 
 def judged(comparison: Comparison) -> tuple[Outcome, ...]:
     """Return the outcomes of all conditions that are not a reference themselves."""
-    return tuple(outcome for outcome in comparison.outcomes if outcome.reference != outcome.pair.name)
+    return tuple(comparison.outcomes[row] for row in _judged_rows(comparison))
+
+
+def _judged_rows(comparison: Comparison) -> list[int]:
+    outcomes = enumerate(comparison.outcomes)
+    return [row for row, outcome in outcomes if outcome.reference != outcome.pair.name]
 
 
 def agreement(comparison: Comparison, *, draws: int = DRAWS, seed: int = 0) -> Agreement:
@@ -130,32 +135,35 @@ def agreement(comparison: Comparison, *, draws: int = DRAWS, seed: int = 0) -> A
     Agreement
         With NaN where nothing can be judged (every condition is a reference).
     """
+    rows = _judged_rows(comparison)
+    if not rows:
+        return _nothing_to_judge()
     outcomes = judged(comparison)
-    rows = [index for index, outcome in enumerate(comparison.outcomes) if outcome in outcomes]
     names = tuple(outcome.pair.name for outcome in outcomes)
     error = np.array([outcome.error.value for outcome in outcomes])
+    bound = np.array([outcome.error.bound for outcome in outcomes])
     covariance = np.asarray(comparison.covariance, dtype=np.float64)[np.ix_(rows, rows)]
     scale = np.sqrt(np.diag(covariance))
     chi_square, freedom = chi_square_of(error, covariance)
     noise = _draw(covariance, draws, np.random.default_rng(seed))
-    bound = np.array([outcome.error.bound for outcome in outcomes])
     inside = np.abs(error + noise) <= bound
     area = float(pooled_area(error, scale))
-    worst = int(np.argmax(np.abs(error))) if rows else -1
+    larger = float((pooled_area(noise, scale) >= area).mean())
+    worst = int(np.argmax(np.abs(error)))
     return Agreement(
         conditions=names,
         chi_square=chi_square,
         degrees_of_freedom=freedom,
         chi_square_probability=float(stats.chi2.sf(chi_square, freedom)) if freedom else math.nan,
         area=area,
-        area_probability=_share(pooled_area(noise, scale) >= area, rows) if area >= 0 else math.nan,
-        bound=float(bound.min()) if rows else math.nan,
-        share_inside=_share(np.abs(error) <= bound, rows),
+        area_probability=larger if math.isfinite(area) else math.nan,
+        bound=float(bound.min()),
+        share_inside=float((np.abs(error) <= bound).mean()),
         probability_each=tuple(float(share) for share in inside.mean(axis=0)),
-        probability_all=_share(inside.all(axis=1), rows),
-        worst=names[worst] if rows else "",
-        worst_error=Estimate(float(error[worst]), float(scale[worst])) if rows else _UNKNOWN,
-        worst_bound_95=float(np.quantile(np.abs(error + noise).max(axis=1), 0.95)) if rows else math.nan,
+        probability_all=float(inside.all(axis=1).mean()),
+        worst=names[worst],
+        worst_error=Estimate(float(error[worst]), float(scale[worst])),
+        worst_bound_95=float(np.quantile(np.abs(error + noise).max(axis=1), 0.95)),
         bland_altman=bland_altman(
             [outcome.simulated_ratio.value for outcome in outcomes],
             [outcome.measured_ratio.value for outcome in outcomes],
@@ -164,6 +172,25 @@ def agreement(comparison: Comparison, *, draws: int = DRAWS, seed: int = 0) -> A
 
 
 _UNKNOWN = Estimate(math.nan, math.nan)
+
+
+def _nothing_to_judge() -> Agreement:
+    return Agreement(
+        conditions=(),
+        chi_square=math.nan,
+        degrees_of_freedom=0,
+        chi_square_probability=math.nan,
+        area=math.nan,
+        area_probability=math.nan,
+        bound=math.nan,
+        share_inside=math.nan,
+        probability_each=(),
+        probability_all=math.nan,
+        worst="",
+        worst_error=_UNKNOWN,
+        worst_bound_95=math.nan,
+        bland_altman=bland_altman([], []),
+    )
 
 
 def chi_square_of(error: ArrayLike, covariance: ArrayLike) -> tuple[float, int]:
@@ -252,10 +279,6 @@ def _trend(x: FloatArray, y: FloatArray) -> Estimate:
 
 def _draw(covariance: FloatArray, draws: int, rng: np.random.Generator) -> FloatArray:
     """Draw errors of a covariance that may be singular; shape (draws, n)."""
-    values, vectors = np.linalg.eigh(covariance) if covariance.size else (np.zeros(0), np.zeros((0, 0)))
+    values, vectors = np.linalg.eigh(covariance)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     return np.asarray(rng.standard_normal((draws, values.size)) @ root.T)
-
-
-def _share(yes: object, rows: list[int]) -> float:
-    return float(np.mean(np.asarray(yes, dtype=float))) if rows else math.nan
