@@ -81,7 +81,7 @@ def measure_coverage(repeats: int = 200) -> None:
             )
             inside += found.low <= truth <= found.high
         print(
-            f"95 % interval of the mean PSNR from {frames} frames holds the truth in {100 * inside / repeats:.1f} %"
+            f"95 % interval of the mean PSNR, {frames} frames: truth inside in {100 * inside / repeats:.1f} %"
         )
     inside = 0
     for seed in range(repeats):
