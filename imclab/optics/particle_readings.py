@@ -118,7 +118,6 @@ def _numbers(mixed: Suspension, diameter: float) -> dict[str, Any]:
     x = np.pi * diameter * spheres.medium_index / spheres.wavelength
     phase = mixed.phase_function
     spread = Suspension(_spread(spheres, diameter), mixed.number_density, mixed.water)
-    area = spheres.cross_sections.extinction
     index = complex(spheres.relative_index)
     return {
         "relative_index": [index.real, -abs(index.imag)],
@@ -126,7 +125,7 @@ def _numbers(mixed: Suspension, diameter: float) -> dict[str, Any]:
         "medium_index": spheres.medium_index,
         "diameter_um": diameter * 1e6,
         "size_parameter": x,
-        "extinction_efficiency": area / (0.25 * np.pi * diameter**2),
+        "extinction_efficiency": spheres.cross_sections.extinction / spheres.mean_area,
         "attenuation_per_m": mixed.attenuation,
         "absorption_per_m": mixed.absorption,
         "scattering_per_m": mixed.scattering,

@@ -108,6 +108,12 @@ class Particles:
         )
 
     @cached_property
+    def mean_area(self) -> float:
+        """Mean geometric cross section of one particle in m**2."""
+        diameters, shares, _ = self._nodes
+        return float(0.25 * np.pi * (shares @ diameters**2))
+
+    @cached_property
     def mean_mass(self) -> float:
         """Mean mass of one particle in kg."""
         diameters, shares, _ = self._nodes
