@@ -128,8 +128,9 @@ def test_blink_and_side_by_side(browser: Tab, folder: Path) -> None:
 
 
 def test_paper_gets_both_pictures_in_light_colours(browser: Tab, folder: Path) -> None:
-    browser.open(folder / "report.html", width=1280, scheme="dark")
+    browser.open(folder / "report.html", width=794, scheme="dark")  # A4 at 96 pixels per inch
     browser.ask("Emulation.setEmulatedMedia", media="print", features=[])
+    assert browser.run("document.documentElement.scrollWidth") <= 794
     ground = browser.run("getComputedStyle(document.body).backgroundColor")
     controls = browser.run("getComputedStyle(document.querySelector('.controls')).display")
     clip = browser.run("getComputedStyle(document.querySelector('.stage .simulated')).clipPath")
