@@ -49,9 +49,7 @@ def main(seeds: int) -> None:
         truth = analog_merit(depth)
         ratios = []
         for seed in range(1, seeds + 1):
-            result = imclab.simulate(
-                scene_at(depth), packets=AUTO_PACKETS, seed=seed, threads=1, time_bins=0
-            )
+            result = imclab.simulate(scene_at(depth), packets=AUTO_PACKETS, seed=seed, threads=1, time_bins=0)
             relative = result.energy_stderr / result.energy
             median, rms = float(np.median(relative)), float(np.sqrt(np.mean(relative**2)))
             ratios.append(merit(result) / truth)

@@ -115,15 +115,14 @@ def test_hard_cases(name: str, estimator: str) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("c", [1.42, 4.0])
-def test_stated_errors_are_true(c: float) -> None:
-    """Of 200 seeds 63 to 73 % lie within one stated error of the truth, 93 to 97 % within two.
+def test_stated_errors_are_true() -> None:
+    """Depth 4: of 200 seeds 63 to 73 % lie within one stated error of the truth, 93 to 97 % within two.
 
     Truth is the mean of all. Errors half as large would hold no more than 40 %.
     """
-    setup = setup_of(scene(c, gate=CENTRED, aperture=0.05, side=0.1, pixels=16))
+    setup = setup_of(scene(4.0, gate=CENTRED, aperture=0.05, side=0.1, pixels=16))
     estimator = two_sided.make(setup)
-    runs, batches, packets = 200, 32, 100
+    runs, batches, packets = 200, 32, 500
     totals, pixels = np.empty((runs, batches)), np.empty((runs, batches, 16))
     for run in range(runs):
         for batch in range(batches):
