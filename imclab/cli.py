@@ -10,7 +10,6 @@ import os
 import sys
 from typing import Annotated
 
-import click
 import typer
 
 import imclab
@@ -82,27 +81,27 @@ def run(arguments: list[str] | None = None) -> int:
     """
     try:
         outcome = app(args=arguments, standalone_mode=False)
-    except click.ClickException as error:
-        error.show()
-        return error.exit_code
-    except (KeyboardInterrupt, click.Abort):
+    except (KeyboardInterrupt, typer.Abort):
         return _tell(KeyboardInterrupt("interrupted"), 130)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
-    except OSError as error:
-        if getattr(error, "exit_code", None) is None and error.filename is not None:
-            return _tell(OSError(f"{error.filename}: {error.strerror}"), 2)
-        code = getattr(error, "exit_code", None)
-        if code is None:
-            raise
-        return _tell(error, code)
     except Exception as error:
-        code = getattr(error, "exit_code", None)
-        if code is None:
-            raise
-        return _tell(error, code)
+        return _outcome_of(error)
     return outcome if isinstance(outcome, int) else 0
+
+
+def _outcome_of(error: Exception) -> int:
+    """Tell an error made on purpose and return its exit code; a fault of the program goes on."""
+    code = getattr(error, "exit_code", None)
+    if code is None:
+        if isinstance(error, OSError) and error.filename is not None:
+            return _tell(OSError(f"{error.filename}: {error.strerror}"), 2)
+        raise error
+    if hasattr(error, "show"):  # a mistake in the words of the command: show the usage as well
+        error.show()
+        return int(code)
+    return _tell(error, int(code))
 
 
 if __name__ == "__main__":

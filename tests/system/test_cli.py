@@ -31,6 +31,12 @@ def test_help_and_version() -> None:
     assert run("--version").stdout.strip() == f"imclab {imclab.__version__}"
 
 
+def test_without_words_it_shows_its_help_and_nothing_else() -> None:
+    done = run()
+    assert "report" in done.stdout + done.stderr
+    assert "imclab: \n" not in done.stderr
+
+
 @pytest.mark.parametrize(
     ("words", "says"),
     [
