@@ -32,7 +32,7 @@ def make(setup: Setup) -> Estimator:
     if setup.time.bins:
         exact["time"] = direct.times
     latest = setup.gate.closes + PULSE_REACH * setup.gate.sigma
-    glossy, veil, peak = glossy_share(setup, grid), smooth_map(setup), peak_angle(setup)
+    glossy, veil, peak = glossy_pixels(setup, grid), smooth_map(setup), peak_angle(setup)
     scatters = setup.water.scattering > 0.0
 
     def batch(seed: int, first_history: int, count: int) -> Tally:
@@ -42,7 +42,7 @@ def make(setup: Setup) -> Estimator:
         if scatters:
             next_event_walks(setup, DIFFUSE_LAST, latest, *run, target, times)
             backscatter_walks(setup, peak, latest, veil.tents, *run, backscatter, times)
-        if glossy.any():
+        if glossy.size:
             mirror_light(setup, glossy, *run, target, times)
         tally = {"backscatter": veil.picture(backscatter), "target": target}
         return tally | {"time": times} if setup.time.bins else tally
@@ -50,15 +50,15 @@ def make(setup: Setup) -> Estimator:
     return Estimator("expected", batch, BATCH_SIZE, exact, left_out(setup))
 
 
-def glossy_share(setup: Setup, grid: PictureGrid) -> FloatArray:
-    """Return the share of glossy surface in each pixel."""
+def glossy_pixels(setup: Setup, grid: PictureGrid) -> NDArray[np.int64]:
+    """Return the numbers, row by row, of the pixels that have any glossy surface."""
     figure = coverage_of(setup.target.mask, *grid.shape)
     shares = np.zeros(grid.shape)
     if setup.target.figure.kind == MICROFACET:
         shares += figure
     if setup.target.ground.kind == MICROFACET:
         shares += np.clip(1.0 - figure, 0.0, 1.0)
-    return shares
+    return np.flatnonzero(shares > 0.0)
 
 
 def left_out(setup: Setup) -> tuple[str, ...]:

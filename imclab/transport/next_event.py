@@ -28,6 +28,8 @@ from imclab.transport.surfaces import sample as sample_surface
 
 NEXT_EVENT_STREAM = 41
 MIRROR_STREAM = 45
+MIRROR_SAMPLES = 4
+"""Samples of unscattered glossy light a packet: they are cheap, and bright in the picture."""
 
 _SHARPEST = 1e200
 
@@ -176,25 +178,22 @@ def next_event_walks(
 
 
 @cached_kernel
-def mirror_light(
-    setup: Any, glossy_share: Any, seed: Any, first: Any, count: int, picture: Any, times: Any
-) -> None:
-    """Add ``count`` samples of unscattered light from laser to glossy surface to aperture.
+def mirror_light(setup: Any, cells: Any, seed: Any, first: Any, count: int, picture: Any, times: Any) -> None:
+    """Add unscattered light from laser to glossy surface to aperture, `MIRROR_SAMPLES` samples a packet.
 
     Samples are spread evenly over the pixels: a point of the pixel, a start in the laser's spot, then the two
-    ways to the aperture. The energies are sums over samples, each standing for the whole picture.
-    ``glossy_share`` (rows, columns) is positive where a pixel has any glossy surface.
+    ways to the aperture. ``cells`` are the pixels, row by row, that have any glossy surface.
     """
     water, target, receiver = setup.water, setup.target, setup.receiver
     rows, columns = picture.shape
-    area = 4.0 * target.half_width * target.half_height
-    for i in range(count):
-        history = first + np.uint64(i)
+    area = 4.0 * target.half_width * target.half_height / (rows * columns)
+    area *= cells.shape[0] / MIRROR_SAMPLES
+    samples = count * MIRROR_SAMPLES
+    for i in range(samples):
+        history = first * np.uint64(MIRROR_SAMPLES) + np.uint64(i)
         u_cell, u_scatter, u_azimuth, _ = uniforms(seed, history, 0, MIRROR_STREAM)
-        cell = min(int((i + u_cell) / count * rows * columns), rows * columns - 1)
+        cell = cells[min(int((i + u_cell) / samples * cells.shape[0]), cells.shape[0] - 1)]
         row, column = cell // columns, cell % columns
-        if glossy_share[row, column] <= 0.0:
-            continue
         u_x, u_y, u_size, u_angle = uniforms(seed, history, 1, MIRROR_STREAM)
         point = (
             (2.0 * (column + u_x) / columns - 1.0) * target.half_width,

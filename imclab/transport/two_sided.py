@@ -23,7 +23,7 @@ from imclab.optics.surface import MICROFACET
 from imclab.transport.backscatter_walk import backscatter_walks, peak_angle
 from imclab.transport.camera_walk import camera_walks
 from imclab.transport.direct_light import coverage_of, direct_light, rules_for
-from imclab.transport.expected import glossy_share, left_out
+from imclab.transport.expected import glossy_pixels, left_out
 from imclab.transport.light_walk import LightMaps, MapAxes, light_walks
 from imclab.transport.next_event import GLOSSY_LAST, mirror_light, next_event_walks
 from imclab.transport.picture_grid import picture_grid
@@ -67,11 +67,11 @@ def make(setup: Setup) -> Estimator:
     if setup.time.bins:
         exact["time"] = direct.times
     swung = collisions_swung(setup)
-    table, peak, glossy = gate_table(setup, axes, direct), peak_angle(setup), glossy_share(setup, grid)
+    table, peak, glossy = gate_table(setup, axes, direct), peak_angle(setup), glossy_pixels(setup, grid)
     shares = gate_matrix(setup, axes)
     unscattered = rings_seen(setup, axes, direct, coverage)
     veil_every = 2 if np.isfinite(latest) else 1  # a gate leaves little backscatter
-    scatters, shiny = setup.water.scattering > 0.0, bool(glossy.any())
+    scatters, shiny = setup.water.scattering > 0.0, glossy.size > 0
     diffuse = {setup.target.figure.kind, setup.target.ground.kind} != {MICROFACET}
 
     def batch(seed: int, first_history: int, count: int) -> Tally:
