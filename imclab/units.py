@@ -21,7 +21,18 @@ SI_UNIT = {
     "number_density": ("1/m**3", "1e12 1/m^3"),
     "salinity": ("g/kg", "35 g/kg"),
 }
-_BARE_NUMBER = re.compile(r"\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?\s*\Z")
+# The units that nearly every scene is written in, so that reading one need not load a library of
+# units (0.7 s). Each is tested against that library, which reads all others.
+COMMON = {
+    "length": {"m": "1", "cm": "1e-2", "mm": "1e-3", "um": "1e-6", "nm": "1e-9"},
+    "time": {"s": "1", "ms": "1e-3", "us": "1e-6", "ns": "1e-9", "ps": "1e-12"},
+    "attenuation": {"1/m": "1"},
+    "angle": {"rad": "1", "mrad": "1e-3"},
+    "energy": {"J": "1", "mJ": "1e-3", "uJ": "1e-6", "nJ": "1e-9"},
+}
+_NUMBER = r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*"
+_BARE_NUMBER = re.compile(_NUMBER + r"\Z")
+_NUMBER_AND_UNIT = re.compile(_NUMBER + r"(\S+)\s*\Z")
 
 
 class UnitError(ValueError):
@@ -57,6 +68,9 @@ def parse(text: str, kind: str) -> float:
         raise UnitError(f"wanted {wanted}")
     if _BARE_NUMBER.match(text):
         raise UnitError(f"a unit is missing; wanted {wanted}")
+    simple = _NUMBER_AND_UNIT.match(_plain(text))
+    if simple and simple[2] in COMMON.get(kind, {}):
+        return _finite(float(Decimal(simple[1]) * Decimal(COMMON[kind][simple[2]])), wanted)
     try:
         quantity = _registry().parse_expression(_plain(text))
         value = float(quantity.to(unit).magnitude)
@@ -64,6 +78,10 @@ def parse(text: str, kind: str) -> float:
         raise UnitError(f"wanted {wanted}") from error
     if kind == "angle" and quantity.unitless and str(quantity.units) == "dimensionless":
         raise UnitError(f"a unit is missing; wanted {wanted}")
+    return _finite(value, wanted)
+
+
+def _finite(value: float, wanted: str) -> float:
     if not math.isfinite(value):
         raise UnitError(f"not finite; wanted {wanted}")
     return value

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -52,3 +55,21 @@ def test_refuses_what_is_no_such_quantity(text: str, kind: str, says: str) -> No
 @given(st.decimals(min_value=0, max_value=10**6, places=6, allow_nan=False))
 def test_decimal_text_becomes_the_nearest_float(number: object) -> None:
     assert units.parse(f"{number} ns", "time") == float(f"{number}e-9")
+
+
+COMMON = [(kind, unit) for kind, known in units.COMMON.items() for unit in known]
+
+
+@pytest.mark.parametrize(("kind", "unit"), COMMON)
+def test_common_units_are_those_of_the_library_of_units(kind: str, unit: str) -> None:
+    import pint
+
+    wanted = pint.UnitRegistry().parse_expression(f"4.25 {unit}").to(units.SI_UNIT[kind][0]).magnitude
+    assert units.parse(f"4.25 {unit}", kind) == pytest.approx(wanted, rel=1e-15)
+
+
+def test_a_common_scene_is_read_without_the_library_of_units() -> None:
+    root = Path(__file__).parents[2]
+    code = "import sys, imclab; imclab.load_scene('data/scenes/tank.toml'); print('pint' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=root, check=True)
+    assert done.stdout.split() == ["False"]
