@@ -102,7 +102,7 @@ def test_every_command_on_every_page_names_a_verb_and_options_that_exist() -> No
     for page in PAGES:
         for _, text in BLOCK.findall(page.read_text(encoding="utf-8")):
             for line in text.splitlines():
-                if line.startswith(("$ imclab ", "imclab ")):
+                if re.match(r"(\$ )?imclab \S", line):
                     known, words = options_of(shlex.split(line.removeprefix("$ "), comments=True)[1:])
                     used = {word for word in words if re.match(r"--?[a-z]", word)}
                     assert used <= known, f"{page.name}: {line}"

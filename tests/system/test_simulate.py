@@ -106,10 +106,7 @@ def test_what_the_user_can_mend_is_told_without_a_traceback(
 
 def test_ctrl_c_saves_what_was_finished(tmp_path: Path) -> None:
     output = tmp_path / "r.h5"
-    # a test run in the background of a shell inherits that SIGINT is ignored
-    program = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
-    program += "from imclab.cli import main; main()"
-    command = [sys.executable, "-c", program, "simulate", str(SLIT), "-o", str(output)]
+    command = [sys.executable, "-m", "imclab", "simulate", str(SLIT), "-o", str(output)]
     process = subprocess.Popen(
         [*command, "--seconds", "100", "--estimator", "analog", "--threads", "1"],
         cwd=ROOT,

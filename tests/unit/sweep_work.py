@@ -74,11 +74,14 @@ def flux_of(unit: Unit, threads: int | None) -> Flux:
     assert unit.one_way is not None
     distances = np.array(unit.one_way.distances)
     share = np.exp(-(unit.scene.medium.attenuation or 0.0) * distances)
-    names = ("transmitted", "reflected", "spot_fwhm", "spot_rms", "pulse_fwhm", "pulse_rms", "mean_path")
+    names = ("transmitted", "reflected", "spot_fwhm", "spot_rms", "pulse_fwhm", "pulse_rms")
+    names += ("mean_path", "reflected_mean_path")
     columns = {key: share for name in names for key in (name, f"{name}_stderr")}
     return Flux(
         distances=distances,
         **columns,
+        absorbed=0.1,
+        absorbed_stderr=0.01,
         scene=unit.scene.toml,
         seed=1,
         packets=1000,
