@@ -12,6 +12,26 @@ from pathlib import Path
 from imclab.errors import Fault, InputError, OutputError
 
 
+def check_output(path: str | Path) -> Path:
+    """Return ``path`` when a file can be written there; tell so before long work, not after it.
+
+    Raises
+    ------
+    OutputError
+        When the folder does not exist or may not be written to, or ``path`` is a folder.
+    """
+    path = Path(path)
+    if path.is_dir():
+        reason = "it is a folder"
+    elif not path.parent.is_dir():
+        reason = f"{path.parent} is no folder"
+    elif not os.access(path.parent, os.W_OK):
+        reason = f"{path.parent} may not be written to"
+    else:
+        return path
+    raise OutputError(f"{path}: cannot be written ({reason}). Name a file in a folder that exists.")
+
+
 @contextmanager
 def written_whole(path: str | Path) -> Iterator[Path]:
     """Give a temporary name beside ``path``; rename it to ``path`` only when the block succeeds.
@@ -21,16 +41,13 @@ def written_whole(path: str | Path) -> Iterator[Path]:
     OutputError
         When the folder does not exist or may not be written to.
     """
-    path = Path(path)
+    path = check_output(path)
     temporary = path.with_name(f".{path.name}.{os.getpid()}.{secrets.token_hex(4)}.part")
     try:
         yield temporary
         temporary.replace(path)
     except OSError as error:
-        raise OutputError(
-            f"{path}: cannot be written ({error.strerror or error}). "
-            "Name a file in a folder that exists and may be written to."
-        ) from error
+        raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from error
     finally:
         temporary.unlink(missing_ok=True)
 

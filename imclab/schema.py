@@ -72,8 +72,11 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         faults = [Fault("file", "no such file", what, "Check the path.")]
-    except (IsADirectoryError, PermissionError, UnicodeDecodeError) as error:
-        faults = [Fault("file", type(error).__name__, f"{what} as UTF-8 text that may be read")]
+    except IsADirectoryError:
+        faults = [Fault("file", "a folder", what, "Name the TOML file in it.")]
+    except (PermissionError, UnicodeDecodeError) as error:
+        came = "no permission to read" if isinstance(error, PermissionError) else "no UTF-8 text"
+        faults = [Fault("file", came, what)]
     except tomllib.TOMLDecodeError as error:
         faults = [Fault("file", str(error), "valid TOML", "Text values need quotes.")]
     raise InputError(str(path), faults)
@@ -93,7 +96,14 @@ def validate(model: type[Model], document: Mapping[str, Any], source: str) -> Mo
     try:
         return model.model_validate(document)
     except ValidationError as error:
-        faults = [_fault(detail, model) for detail in error.errors(include_url=False)]
+        details = error.errors(include_url=False)
+        # A list whose items are at fault is not too short as well, though pydantic says so.
+        faulty = {detail["loc"][0] for detail in details if len(detail["loc"]) > 1}
+        faults = [
+            _fault(detail, model)
+            for detail in details
+            if detail["type"] != "too_short" or detail["loc"][0] not in faulty or len(detail["loc"]) > 1
+        ]
         raise InputError(source, sorted(faults, key=lambda fault: fault.where)) from None
 
 

@@ -67,7 +67,7 @@ def parse(text: str, kind: str) -> float:
     if not isinstance(text, str) or not text.strip():
         raise UnitError(f"wanted {wanted}")
     if _BARE_NUMBER.match(text):
-        raise UnitError(f"a unit is missing; wanted {wanted}")
+        raise UnitError(f"wanted {wanted}: the unit is missing")
     simple = _NUMBER_AND_UNIT.match(_plain(text))
     if simple and simple[2] in COMMON.get(kind, {}):
         return _finite(float(Decimal(simple[1]) * Decimal(COMMON[kind][simple[2]])), wanted)
@@ -77,13 +77,13 @@ def parse(text: str, kind: str) -> float:
     except Exception as error:  # pint raises many unrelated kinds, tokenizer errors among them
         raise UnitError(f"wanted {wanted}") from error
     if kind == "angle" and quantity.unitless and str(quantity.units) == "dimensionless":
-        raise UnitError(f"a unit is missing; wanted {wanted}")
+        raise UnitError(f"wanted {wanted}: the unit is missing")
     return _finite(value, wanted)
 
 
 def _finite(value: float, wanted: str) -> float:
     if not math.isfinite(value):
-        raise UnitError(f"not finite; wanted {wanted}")
+        raise UnitError(f"wanted {wanted}, finite")
     return value
 
 

@@ -322,7 +322,8 @@ def _flat(settings: dict[str, Any], prefix: str = "") -> list[tuple[str, Any]]:
 
 def _set_text(data: dict[str, Any], sent: list[str]) -> str:
     rows = [f"  {one['name']:<24} {one['before']} -> {one['after']}" for one in data["changes"]]
-    head = f"{data['generator']}: output {data['output']} reads {data['read_delay_ps']} ps, "
+    box = data["generator"] if data["live"] else f"a simulated {data['generator']}"
+    head = f"{box}: output {data['output']} reads {data['read_delay_ps']} ps, "
     head += f"{data['read_width_ps']} ps wide; triggers off"
     if data["live"]:
         return "\n".join([head, *rows])

@@ -47,6 +47,7 @@ def particles(
         water=water,
     )
     _check_one_amount(optical_depth, concentration, number_density)
+    _check_above_zero("--optical-depth", optical_depth)
     amount = Amount(
         optical_depth=optical_depth,
         path=_quantity("--path", path, "length"),
@@ -99,6 +100,13 @@ def _check_one_amount(*given: object) -> None:
     if count != 1:
         wanted = "exactly one of --optical-depth, --concentration, --number-density"
         raise InputError("imclab particles", [Fault("amount of particles", f"{count} options", wanted)])
+
+
+def _check_above_zero(option: str, value: float | None) -> None:
+    from imclab.errors import Fault, InputError
+
+    if value is not None and not value > 0:
+        raise InputError("imclab particles", [Fault(option, f"{value:g}", "a number above 0")])
 
 
 def _index(text: str) -> complex:

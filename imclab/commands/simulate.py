@@ -31,8 +31,10 @@ def simulate(
     """
     import imclab
     from imclab.errors import InterruptedRunError
+    from imclab.files import check_output
     from imclab.transport.simulation import DEFAULT_TIME_BINS
 
+    check_output(output)
     progress = Progress()
     try:
         result = imclab.simulate(

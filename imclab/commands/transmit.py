@@ -30,8 +30,10 @@ def transmit(
     """
     import imclab
     from imclab.errors import InterruptedRunError
+    from imclab.files import check_output
     from imclab.sweep import parse_distances
 
+    check_output(output)
     progress = Progress()
     try:
         flux = imclab.transmit(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -146,7 +147,11 @@ def run_report(
     say("page")
     context = background(experiment, Path(path), camera, store.folder)
     save(comparison, context, store.folder)
-    return Report(comparison=comparison, paths=render(comparison, store.folder, context=context))
+    paths = render(comparison, store.folder, context=context)
+    store.forget_unused()
+    for picture in set((store.folder / "figures").iterdir()) - set(paths.figures):
+        picture.unlink()  # of conditions that the experiment no longer has
+    return Report(comparison=comparison, paths=paths)
 
 
 def render_again(folder: str | Path) -> Report:
@@ -159,6 +164,10 @@ def render_again(folder: str | Path) -> Report:
     """
     comparison, context = load(folder)
     return Report(comparison=comparison, paths=render(comparison, folder, context=context))
+
+
+def _error(relative: float) -> str:
+    return f"{relative:.2%}" if math.isfinite(relative) else "error not known yet"
 
 
 def _calibration_key(experiment: Experiment) -> str:
@@ -233,7 +242,7 @@ def _sighting(
             seed=how.seed,
             estimator=how.estimator,
             threads=threads,
-            progress=lambda at: say(f"simulating {label}: {at.rel_error:.2%} after {at.seconds:.1f} s"),
+            progress=lambda at: say(f"simulating {label}: {_error(at.rel_error)} after {at.seconds:.1f} s"),
             **until,
         )
         if result.interrupted:

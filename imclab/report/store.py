@@ -32,13 +32,17 @@ class Store:
         if strangers:
             wanted = "a folder that is empty, not there yet, or holds an earlier report"
             raise InputError(str(folder), [Fault("output", "a folder with other files in it", wanted)])
+        self._used: set[str] = set()
         self._ledger: dict[str, str] = {}
         if self._ledger_path.is_file():
             self._ledger = json.loads(self._ledger_path.read_text(encoding="utf-8"))
 
     def holds(self, name: str, key: str) -> bool:
         """Tell whether the file ``name`` is there and was made from the inputs that ``key`` names."""
-        return self._ledger.get(name) == key and (self.folder / name).is_file()
+        found = self._ledger.get(name) == key and (self.folder / name).is_file()
+        if found:
+            self._used.add(name)
+        return found
 
     def keep(self, name: str, key: str, save: Callable[[Path], None]) -> None:
         """Save the file ``name`` and note what it was made from; the folder is made when it is needed."""
@@ -50,6 +54,14 @@ class Store:
         self._write()
         save(self.folder / name)
         self._ledger[name] = key
+        self._used.add(name)
+        self._write()
+
+    def forget_unused(self) -> None:
+        """Remove the kept files that this run had no use for: of conditions that are no more."""
+        for name in set(self._ledger) - self._used:
+            (self.folder / name).unlink(missing_ok=True)
+            del self._ledger[name]
         self._write()
 
     def _write(self) -> None:

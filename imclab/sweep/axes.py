@@ -50,7 +50,7 @@ def parse_axis(text: str) -> Axis:
     key, equals, values = text.partition("=")
     key = key.strip()
     if not equals or not re.fullmatch(r"\w+(\.\w+)*", key):
-        raise InputError("--set", [Fault(text, "no KEY=VALUES", _VALUES_WANTED)])
+        raise InputError("--set", [Fault(f'"{text}"', "no KEY=VALUES", _VALUES_WANTED)])
     items = [item for part in _split(values) for item in _read(part.strip(), key)]
     if not items:
         raise InputError("--set", [Fault(key, "no value", _VALUES_WANTED)])

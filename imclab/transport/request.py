@@ -30,6 +30,10 @@ def limits(
         for name, value in asked.items()
         if value is not None and not (math.isfinite(value) and value > 0)
     ]
+    if asked["rel_error"] is not None and not faults and asked["rel_error"] >= 1:
+        faults.append(
+            Fault("rel_error", f"{asked['rel_error']}", "a number above 0 and below 1: 0.02 is 2 %")
+        )
     if asked["packets"] is not None and not faults and asked["packets"] < 1:
         faults.append(Fault("packets", f"{asked['packets']}", "at least 1"))
     if faults:

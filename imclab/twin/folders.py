@@ -89,7 +89,7 @@ def write_experiment(
         )
     document = {
         "schema": 1,
-        "title": f"Synthetic: {title}" if title else "Synthetic experiment",
+        "title": title or "Synthetic experiment",
         "synthetic": True,
         "scene": "scene.toml",
         "calibration": "calibration",
