@@ -252,8 +252,9 @@ def _read_mask(path: Path) -> NDArray[np.bool_]:
     if picture.ndim != 2:
         raise ValueError(f"{picture.ndim} dimensions")
     if picture.dtype != bool:
-        if len(np.unique(picture)) > 2:
-            raise ValueError(f"{len(np.unique(picture))} grey levels")
-        full = 1 if picture.dtype.kind == "f" else np.iinfo(picture.dtype).max
-        picture = picture > full / 2 if picture.max() > 1 else picture > 0
+        levels = np.unique(picture)
+        if len(levels) > 2:
+            raise ValueError(f"{len(levels)} grey levels")
+        # Two levels: the brighter is white. One alone: all figure unless it is black.
+        picture = picture > (levels[0] if len(levels) == 2 else 0)
     return np.ascontiguousarray(picture)

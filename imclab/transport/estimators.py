@@ -8,6 +8,7 @@ from imclab.errors import Fault, InputError
 from imclab.optics.surface import MICROFACET
 from imclab.transport import analog, expected, two_sided
 from imclab.transport.runner import Estimator
+from imclab.transport.scattering import HenyeyGreensteinLaw
 from imclab.transport.setup import Setup
 
 MAKERS = {"analog": analog.make, "expected": expected.make, "two-sided": two_sided.make}
@@ -21,10 +22,20 @@ def choose(name: str, setup: Setup) -> Estimator:
         return replace(made, notes=(f"estimator {chosen}: {reason}", *made.notes))
     if name not in MAKERS:
         raise InputError("simulate", [Fault("estimator", repr(name), ", ".join(["auto", *MAKERS]))])
+    if name != "analog" and _scatters_straight_back(setup):
+        wanted = "analog or auto: what is scattered straight back cannot be joined with the beam, only met"
+        raise InputError("simulate", [Fault("estimator", f"{name} with g = -1", wanted)])
     return MAKERS[name](setup)
 
 
+def _scatters_straight_back(setup: Setup) -> bool:
+    law = setup.phase
+    return isinstance(law, HenyeyGreensteinLaw) and law.asymmetry <= -1.0 and setup.water.scattering > 0.0
+
+
 def _suitable(setup: Setup) -> tuple[str, str]:
+    if _scatters_straight_back(setup):
+        return "analog", "light scattered straight back (g = -1) cannot be joined with the beam, only met"
     kinds = {setup.target.figure.kind, setup.target.ground.kind}
     if kinds == {MICROFACET}:
         return "two-sided", "backscatter from the camera's side, light of the glossy target from the laser's"

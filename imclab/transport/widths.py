@@ -8,9 +8,9 @@ from scipy.optimize import brentq
 
 FloatArray = NDArray[np.float64]
 
-PEAK_WINDOW = 0.5
+PEAK_WINDOW = 0.6
 """The peak is a fit over radii up to this part of the half width."""
-CROSSING_WINDOW = 0.2
+CROSSING_WINDOW = 0.3
 """The crossing is a fit over radii within this part of the half width around it."""
 _ROUNDS = 12
 
@@ -18,8 +18,9 @@ _ROUNDS = 12
 def spot_fwhm(edges: FloatArray, energy: FloatArray) -> float:
     """Return twice the radius at which the irradiance is half of that on the axis, m.
 
-    The peak is fitted by a + b r^2 near the axis and the crossing by a straight line around it, each
-    over a window that is a part of the half width, found by repetition.
+    The peak is fitted by a + b r^2 + c r^4 near the axis and the crossing by a parabola around it,
+    each over a window that is a part of the half width, found by repetition. A term less in either
+    makes a Gaussian 0.4 % too wide.
 
     Parameters
     ----------
@@ -44,12 +45,11 @@ def spot_fwhm(edges: FloatArray, energy: FloatArray) -> float:
     half_width = radius[np.searchsorted(np.cumsum(energy), 0.5 * total)]
     for _ in range(_ROUNDS):
         window = radius <= max(PEAK_WINDOW * half_width, radius[min(3, radius.size - 1)])
-        peak = _fitted(radius[window] ** 2, irradiance[window], area[window])[0]
+        peak = _parabola(radius[window] ** 2, irradiance[window], area[window])[0]
         below = _smooth(irradiance, area, radius, half_width) < 0.5 * peak
         crude = radius[np.argmax(below)] if below.any() else radius[-1]
         near = np.abs(radius - crude) <= max(CROSSING_WINDOW * crude, 2.5 * (outer - inner)[np.argmax(below)])
-        level, slope = _fitted(radius[near] - crude, irradiance[near], area[near])
-        refined = crude + (0.5 * peak - level) / slope if slope < 0.0 else crude
+        refined = crude + _crossing(_parabola(radius[near] - crude, irradiance[near], area[near]), 0.5 * peak)
         new = refined if abs(refined - crude) <= CROSSING_WINDOW * crude else crude
         if abs(new - half_width) <= 1e-6 * new:
             break
@@ -57,12 +57,27 @@ def spot_fwhm(edges: FloatArray, energy: FloatArray) -> float:
     return float(2.0 * half_width)
 
 
-def _fitted(x: FloatArray, y: FloatArray, weight: FloatArray) -> tuple[float, float]:
-    """Return value at 0 and slope of a straight line by weighted least squares."""
-    mean_x, mean_y = np.average(x, weights=weight), np.average(y, weights=weight)
-    spread = np.average((x - mean_x) ** 2, weights=weight)
-    slope = np.average((x - mean_x) * (y - mean_y), weights=weight) / spread if spread > 0.0 else 0.0
-    return float(mean_y - slope * mean_x), float(slope)
+def _parabola(x: FloatArray, y: FloatArray, weight: FloatArray) -> tuple[float, float, float]:
+    """Return value, slope and half the curvature at 0 by weighted least squares; fewer with few points."""
+    terms = min(3, x.size)
+    scale = float(np.abs(x).max()) or 1.0
+    columns = (x[:, None] / scale) ** np.arange(terms)
+    root = np.sqrt(weight / weight.max())
+    found = np.linalg.lstsq(columns * root[:, None], y * root, rcond=None)[0] / scale ** np.arange(terms)
+    value, slope, bend = np.append(found, np.zeros(3 - terms))
+    return float(value), float(slope), float(bend)
+
+
+def _crossing(parabola: tuple[float, float, float], level: float) -> float:
+    """Return where a falling parabola crosses ``level`` next to 0; 0 when it does not fall."""
+    value, slope, bend = parabola
+    if not slope < 0.0:
+        return 0.0
+    inside = slope**2 - 4.0 * bend * (value - level)
+    if inside <= 0.0:
+        return (level - value) / slope
+    # the root next to 0, in the form that does not cancel
+    return float(2.0 * (level - value) / (slope - np.sqrt(inside)))
 
 
 def _smooth(irradiance: FloatArray, area: FloatArray, radius: FloatArray, width: float) -> FloatArray:

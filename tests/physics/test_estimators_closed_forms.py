@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import imclab
+from imclab.errors import InputError
 from imclab.scene import Scene
 from imclab.transport import two_sided
 from imclab.transport.setup import setup_of
@@ -89,7 +90,6 @@ def test_single_scattering_lidar_return(g: float) -> None:
 HARD = {
     "opaque": scene(30.0, gate=CENTRED),
     "forward": scene(1.0, g=1.0),
-    "backward": scene(1.0, g=-1.0),
     "nearly forward": scene(1.0, g=0.9999),
     "nearly backward": scene(1.0, g=-0.9999),
     "white": scene(1.0, albedo=1.0),
@@ -112,6 +112,17 @@ def test_hard_cases(name: str, estimator: str) -> None:
         assert values is not None
         assert np.isfinite(values).all()
         assert (values >= -1e-30).all()
+
+
+def test_light_scattered_straight_back_is_left_to_the_estimator_that_can_meet_it() -> None:
+    """Joins and next events do not see a delta: they would say 0 +- 0 where there are 4e-7 J."""
+    of = scene(1.0, g=-1.0, albedo=0.9)
+    result = imclab.simulate(of, packets=20_000, seed=1, time_bins=0)
+    assert result.estimator == "analog"
+    assert result.backscatter_total > 5 * result.backscatter_total_stderr > 0
+    for estimator in ("expected", "two-sided"):
+        with pytest.raises(InputError, match="straight back"):
+            imclab.simulate(of, estimator=estimator, packets=640)
 
 
 @pytest.mark.slow
