@@ -113,7 +113,7 @@ def _sendable(error: Exception) -> Exception:
     """Return the error if it survives the way to the parent, else its words."""
     try:
         pickle.loads(pickle.dumps(error))
-    except Exception:
+    except Exception:  # pickling runs the error's own code, which may raise anything
         return RuntimeError(f"{type(error).__name__}: {error}")
     return error
 
