@@ -41,10 +41,11 @@ class DirectLight(NamedTuple):
         Irradiance of the target times diffuse albedo, 1/m².
     time : array (rows, columns)
         When it arrives there, s.
-    reach : array (rows, columns)
-        Energy that the aperture gathers unscattered from a cell of unit radiance, m² sr.
+    reach : array (rows, columns, nodes)
+        Energy that the aperture gathers unscattered from a cell of unit radiance, m² sr, parted among
+        the first nodes of camera time: the ways to the points of a wide aperture differ.
     return_time : array (rows, columns)
-        How long that takes, s.
+        Mean time from cell to aperture, s.
     picture : array (rows, columns)
         Gated energy of each cell, unscattered both ways.
     times : array (impulse bins)
@@ -84,12 +85,26 @@ def rules_for(setup: Setup) -> Rules:
     return Rules(np.ascontiguousarray(spot), np.outer(weights, weights).ravel(), aperture, areas)
 
 
+def nodes_reached(setup: Setup, times: FloatArray) -> int:
+    """Return how many nodes of camera time light from the target to the aperture can need."""
+    target, receiver = setup.target, setup.receiver
+    across = math.hypot(
+        target.half_width + abs(receiver.x) + receiver.radius,
+        target.half_height + abs(receiver.y) + receiver.radius,
+    )
+    longest = math.hypot(across, target.distance - receiver.z) / setup.water.group_velocity
+    return min(int(np.searchsorted(times, longest)) + 1, times.size)
+
+
 @cached_kernel
-def direct_light(setup: Any, rules: Rules, coverage: Any) -> DirectLight:
-    """Compute the unscattered light for a grid of cells over the target, of which a share is figure."""
+def direct_light(setup: Any, rules: Rules, coverage: Any, times_back: Any, nodes: int) -> DirectLight:
+    """Compute the unscattered light for a grid of cells over the target, of which a share is figure.
+
+    ``times_back`` are the nodes of camera time (see `MapAxes`), ``nodes`` how many of them are needed.
+    """
     rows, columns = coverage.shape
     lit = np.zeros((2, rows, columns))
-    time, reach = np.zeros((rows, columns)), np.zeros((rows, columns))
+    time, reach = np.zeros((rows, columns)), np.zeros((rows, columns, nodes))
     return_time, picture = np.zeros((rows, columns)), np.zeros((rows, columns))
     times = np.zeros(setup.time.bins)
     target = setup.target
@@ -105,8 +120,8 @@ def direct_light(setup: Any, rules: Rules, coverage: Any) -> DirectLight:
                 lit[0, row, column] += 0.25 * figure
                 lit[1, row, column] += 0.25 * ground
                 time[row, column] += 0.25 * arrival
-                seen, back, gated = _gathered(setup, rules, x, y, arrival)
-                reach[row, column] += 0.25 * cell * seen
+                parts = reach[row, column]
+                seen, back, gated = _gathered(setup, rules, (x, y), arrival, times_back, 0.25 * cell, parts)
                 return_time[row, column] += 0.25 * back
                 radiance = ground + coverage[row, column] * (figure - ground)
                 radiance *= 0.25 * cell / math.pi
@@ -134,10 +149,16 @@ def _irradiance(setup: Any, rules: Any, x: Any, y: Any) -> Any:
 
 
 @device
-def _gathered(setup: Any, rules: Any, x: Any, y: Any, arrival: Any) -> Any:
-    """Return the aperture's integral for a point of unit radiance, its mean time, the gated integral."""
+def _gathered(
+    setup: Any, rules: Any, place: Any, arrival: Any, times_back: Any, cell: Any, parts: Any
+) -> Any:
+    """Return the aperture's integral for a point of unit radiance, its mean time, the gated integral.
+
+    The integral times ``cell`` (m²) is also added to ``parts``, by node of camera time.
+    """
     receiver, water = setup.receiver, setup.water
     depth = setup.target.distance - receiver.z
+    x, y = place
     seen = moment = gated = 0.0
     for i in range(rules.aperture.shape[0]):
         dx = x - receiver.x - rules.aperture[i, 0]
@@ -150,10 +171,27 @@ def _gathered(setup: Any, rules: Any, x: Any, y: Any, arrival: Any) -> Any:
         value *= math.exp(-water.attenuation * way)
         seen += value
         moment += value * way
+        _part_in_time(times_back, way / water.group_velocity, value * cell, parts)
         gated += value * gate_share(setup.gate, arrival + way / water.group_velocity)
     straight = math.sqrt((x - receiver.x) ** 2 + (y - receiver.y) ** 2 + depth * depth)
     mean_way = moment / seen if seen > 0.0 else straight
     return seen, mean_way / water.group_velocity, gated
+
+
+@device
+def _part_in_time(times: Any, time: Any, value: Any, parts: Any) -> None:
+    """Add a value to the two nodes around a time, so that linear interpolation is made up for.
+
+    What is later than the last node comes when the gate has closed: it counts nowhere.
+    """
+    last = times.shape[0] - 1
+    if last == 0 or time <= times[0]:
+        parts[0] += value
+    elif time < times[last]:
+        node = np.searchsorted(times, time, side="right") - 1
+        later = (time - times[node]) / (times[node + 1] - times[node])
+        parts[node] += value * (1.0 - later)
+        parts[node + 1] += value * later
 
 
 def coverage_of(mask: NDArray[np.uint8], rows: int, columns: int) -> FloatArray:

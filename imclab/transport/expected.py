@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imclab.optics.surface import MICROFACET
-from imclab.transport.backscatter_walk import backscatter_walks, peak_angle
+from imclab.transport.backscatter_walk import backscatter_walks, way_home
 from imclab.transport.direct_light import coverage_of, direct_light, rules_for
 from imclab.transport.next_event import DIFFUSE_LAST, mirror_light, next_event_walks
 from imclab.transport.picture_grid import PictureGrid, picture_grid
 from imclab.transport.runner import Estimator, Tally
-from imclab.transport.setup import PULSE_REACH, Setup
+from imclab.transport.setup import PULSE_REACH, Setup, first_return
 from imclab.transport.smooth_map import smooth_map
 
 FloatArray = NDArray[np.float64]
@@ -27,12 +27,13 @@ BATCH_SIZE = 20_000
 def make(setup: Setup) -> Estimator:
     """Return the expected estimator of a set-up."""
     grid = picture_grid(setup)
-    direct = direct_light(setup, rules_for(setup), coverage_of(setup.target.mask, *grid.cells))
+    coverage = coverage_of(setup.target.mask, *grid.cells)
+    direct = direct_light(setup, rules_for(setup), coverage, np.zeros(1), 1)
     exact = {"target": grid.pixels(direct.picture), "backscatter": np.zeros(grid.shape)}
     if setup.time.bins:
         exact["time"] = direct.times
     latest = setup.gate.closes + PULSE_REACH * setup.gate.sigma
-    glossy, veil, peak = glossy_pixels(setup, grid), smooth_map(setup), peak_angle(setup)
+    glossy, veil, home = glossy_pixels(setup, grid), smooth_map(setup), way_home(setup, latest)
     scatters = setup.water.scattering > 0.0
 
     def batch(seed: int, first_history: int, count: int) -> Tally:
@@ -41,7 +42,7 @@ def make(setup: Setup) -> Estimator:
         run = (np.uint64(seed), np.uint64(first_history), count)
         if scatters:
             next_event_walks(setup, DIFFUSE_LAST, latest, *run, target, times)
-            backscatter_walks(setup, peak, latest, veil.tents, *run, backscatter, times)
+            backscatter_walks(setup, home, latest, veil.tents, *run, backscatter, times)
         if glossy.size:
             mirror_light(setup, glossy, *run, target, times)
         tally = {"backscatter": veil.picture(backscatter), "target": target}
@@ -68,6 +69,8 @@ def left_out(setup: Setup) -> tuple[str, ...]:
         notes.append("no walks: the water does not scatter")
     elif np.isfinite(setup.gate.closes):
         notes.append("walks end when they can no longer arrive before the gate closes")
+    if setup.gate.closes + PULSE_REACH * setup.gate.sigma <= first_return(setup):
+        notes.append("no walks for the target: the gate closes before any of its light returns")
     if not setup.time.bins:
         notes.append("no time histogram: not asked for")
     return tuple(notes)

@@ -205,23 +205,23 @@ def light_walks(
                 if weight == 0.0 or dice > ROULETTE_CHANCE:
                     break
                 weight /= ROULETTE_CHANCE
+            # not the way ahead but the shortest: a grazing walk may yet be turned toward the target
+            if path + (target.distance - z) > farthest:
+                break
             way = 1e30
             if direction[2] > 0.0:
                 way = (target.distance - z) / direction[2]
-                if path + way > farthest:
-                    break
                 arriving_weight = weight * math.exp(-water.attenuation * way)
                 figure = arriving_weight * diffuse_albedo(target.figure, direction[2])
                 ground = arriving_weight * diffuse_albedo(target.ground, direction[2])
                 place = (x + way * direction[0], y + way * direction[1])
                 ball = (place[0] - start[0]) ** 2 + (place[1] - start[1]) ** 2 + target.distance**2
-                if touched or collisions > swung or farthest_square >= ball:
+                in_time = path + way <= farthest
+                if in_time and (touched or collisions > swung or farthest_square >= ball):
                     time = (path + way) / water.group_velocity
                     score(setup, axes, maps, touched, place, (figure, ground), time)
             elif direction[2] < 0.0:
                 way = -z / direction[2]
-                if path + (target.distance - z) > farthest:
-                    break
             _, u_free, u_scatter, u_azimuth = uniforms(seed, history, event, LIGHT_STREAM)
             free = -math.log(u_free) * mean_free_path
             at_target = free >= way

@@ -132,6 +132,12 @@ def target_return(scene: Scene, group_velocity: float) -> float:
     return (distance + math.hypot(x, y, distance - z)) / group_velocity
 
 
+def first_return(setup: Setup) -> float:
+    """Return when the pulse's peak can come back from the target at the earliest, s."""
+    target, receiver = setup.target, setup.receiver
+    return (2.0 * target.distance - receiver.z) / setup.water.group_velocity
+
+
 def beam_of(scene: Scene, refractive_index: float) -> Beam:
     """Return the beam inside the water.
 

@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from imclab.transport.even_points import advance, coordinate, first_point
 from imclab.transport.kernel_cache import cached_kernel, device
 from imclab.transport.light_walk import MapAxes, diffuse_albedo, empty_maps, score
 from imclab.transport.random import uniforms
@@ -29,6 +30,8 @@ from imclab.transport.setup import Setup
 
 MOST_COLLISIONS = 8
 SWUNG_STREAM = 51
+EVEN_COLLISIONS = 2
+"""Collisions whose numbers are spread evenly over a batch, four for each."""
 WIDE_BEAM = 0.5
 """Walks are swung where the beam's standard deviation on the target is more than so many half diagonals."""
 
@@ -91,17 +94,19 @@ def swung_walks(setup: Any, axes: MapAxes, latest: float, seed: Any, first: Any,
     mean_free_path = 1.0 / max(water.attenuation, 1e-30)
     farthest, widest = latest * water.group_velocity, axes.radii[-1]
     area = math.pi * widest * widest
+    even = first_point(seed, first, SWUNG_STREAM + 1)
     for i in range(count):
+        advance(even, i)
         history = first + np.uint64(i)
-        u_size, u_around, u_ring, u_free = uniforms(seed, history, 0, SWUNG_STREAM)
+        u_around, u_size, _, _ = uniforms(seed, history, 0, SWUNG_STREAM)
         size = setup.beam.spot_sigma * math.sqrt(-2.0 * math.log(u_size))
-        radius = widest * math.sqrt((i + u_ring) / count)
+        radius = widest * math.sqrt(coordinate(even, 0))
         x, y = radius - size * math.cos(2.0 * math.pi * u_around), size * math.sin(2.0 * math.pi * u_around)
         ball = math.sqrt(x * x + y * y + target.distance * target.distance)
         wanted = (x / ball, y / ball, target.distance / ball)
         into = -math.expm1(-water.attenuation * ball)
         weight, path = into * area, 0.0
-        free = -math.log1p(-u_free * into) * mean_free_path
+        free = -math.log1p(-coordinate(even, 1) * into) * mean_free_path
         point, direction = (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
         for collision in range(MOST_COLLISIONS):
             point = (
@@ -115,6 +120,10 @@ def swung_walks(setup: Any, axes: MapAxes, latest: float, seed: Any, first: Any,
                 break
             vertices[collision, 0], vertices[collision, 1], vertices[collision, 2] = point
             u_scatter, u_azimuth, u_turn, u_free = uniforms(seed, history, collision + 1, SWUNG_STREAM)
+            if collision < EVEN_COLLISIONS:
+                k = 2 + 4 * collision
+                u_scatter, u_turn = coordinate(even, k), coordinate(even, k + 1)
+                u_free, u_azimuth = coordinate(even, k + 2), coordinate(even, k + 3)
             weight *= water.albedo
             angle = 2.0 * math.pi * u_azimuth
             deviation = sample_deviation(setup.phase, u_scatter)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from imclab.transport.direct_light import DirectLight
 from imclab.transport.gathering import gate_share
-from imclab.transport.kernel_cache import cached_kernel
+from imclab.transport.kernel_cache import cached_kernel, device
 from imclab.transport.light_walk import MapAxes, ring_of
 from imclab.transport.setup import Setup
 
@@ -100,13 +100,18 @@ def gate_matrix(setup: Setup, axes: MapAxes) -> FloatArray:
 
 
 def gate_table(setup: Setup, axes: MapAxes, direct: DirectLight) -> tuple[float, float, FloatArray]:
-    """Return start, step and shares of the gate, tabulated over all arrivals of direct light."""
-    if not math.isfinite(setup.gate.opens):
-        return 0.0, 1.0, np.ones(0)
+    """Return start, step and the gate's shares (arrivals, times) of direct light, by its arrival there.
+
+    The arrivals are even steps over those that occur on the target, two at least.
+    """
+    start, last = float(direct.time.min()), float(direct.time.max())
     step = setup.gate.sigma / TABLE_STEPS_PER_SIGMA
-    start = float(direct.time.min() + axes.times[0]) - step
-    count = int((direct.time.max() + axes.times[-1] - start) / step) + 3
-    return start, step, _shares_at(setup, start + step * np.arange(count))
+    count = int((last - start) / step) + 2
+    if not math.isfinite(setup.gate.opens):
+        return start, step, np.ones((count, axes.times.size), dtype=np.float32)
+    arrivals = start + step * np.arange(count)
+    total = (arrivals[:, None] + axes.times[None, :]).ravel()
+    return start, step, _shares_at(setup, total).reshape(count, -1).astype(np.float32)
 
 
 @cached_kernel
@@ -117,61 +122,75 @@ def _shares_at(setup: Any, arrivals: Any) -> Any:
     return shares
 
 
+@device
+def _times_last(table: Any) -> Any:
+    """Return a table (materials, times, places) as float32 (materials, places · times)."""
+    materials, times, places = table.shape
+    turned = np.empty((materials, places * times), dtype=np.float32)
+    for material in range(materials):
+        for place in range(places):
+            for n in range(times):
+                turned[material, place * times + n] = table[material, n, place]
+    return turned
+
+
+@device
+def _add(line: Any, table: Any, place: Any, amount: Any) -> None:
+    """Add ``amount`` times the values of a table (places · times) at a place to a line of times."""
+    here, part = np.uint64(place * line.shape[0]), np.float32(amount)
+    for n in range(np.uint64(line.shape[0])):
+        line[n] += part * table[here + n]
+
+
+@device
+def _add_between(line: Any, table: Any, place: Any, amount: Any) -> None:
+    """Do what `_add` does, interpolating linearly between the places around ``place``."""
+    inner = int(place)
+    times, outer, part = line.shape[0], np.float32(place - inner), np.float32(amount)
+    here, beyond = np.uint64(inner * times), np.uint64((inner + 1) * times)
+    for n in range(np.uint64(times)):
+        line[n] += part * (table[here + n] + outer * (table[beyond + n] - table[here + n]))
+
+
 @cached_kernel
 def gated_radiance(
     setup: Any, axes: MapAxes, table: Any, direct: DirectLight, coverage: Any, rings: Any, late: Any
 ) -> Any:
-    """Return the gated radiance (times, rows, columns), float32, and the picture of scattered light.
+    """Return the gated radiance (rows, times, columns), float32, and the picture of scattered light.
 
     ``table`` is that of `gate_table`; ``rings`` (2, times, rings) and ``late`` (2, times, cells, cells)
     are the gated light on the target per packet; the picture is of light scattered on its way to the
-    target and seen unscattered.
+    target and seen unscattered. All tables are turned so that times stand side by side: that loop
+    vectorises (2 times as fast as one over columns, which has to gather).
     """
     rows, columns = coverage.shape
-    target, times = setup.target, axes.times
+    target, times, nodes = setup.target, axes.times.shape[0], direct.reach.shape[2]
     start, step, shares = table
-    radiance = np.empty((times.shape[0], rows, columns), dtype=np.float32)
+    radiance = np.empty((rows, times, columns), dtype=np.float32)
     picture = np.zeros((rows, columns))
-    ring, outer = np.empty(columns, dtype=np.int64), np.empty(columns)
-    figure, ground = np.empty(columns), np.empty(columns)
-    straight, place = np.empty(columns), np.empty(columns)
-    scattered, previous = np.empty(columns), np.empty(columns)
-    last_seen = np.searchsorted(times, direct.return_time.max()) + 1
+    by_ring, by_cell = _times_last(rings), _times_last(late.reshape(2, times, axes.cells * axes.cells))
+    gate = shares.ravel()
+    touched = late.any()
+    line = np.empty(times, dtype=np.float32)
     for row in range(rows):
         y = (2.0 * (row + 0.5) / rows - 1.0) * target.half_height
         coarse_row = int((row + 0.5) / rows * axes.cells)
         for column in range(columns):
             x = (2.0 * (column + 0.5) / columns - 1.0) * target.half_width
-            ring[column], outer[column] = ring_of(axes.radii, math.sqrt(x * x + y * y))
-            figure[column] = coverage[row, column] / math.pi
-            ground[column] = (1.0 - coverage[row, column]) / math.pi
-            straight[column] = figure[column] * direct.lit[0, row, column]
-            straight[column] += ground[column] * direct.lit[1, row, column]
-            scattered[column] = previous[column] = 0.0
-        for n in range(times.shape[0]):
-            for column in range(columns):
-                coarse_column = int((column + 0.5) / columns * axes.cells)
-                inner, outside = ring[column], outer[column]
-                on_figure = rings[0, n, inner] + outside * (rings[0, n, inner + 1] - rings[0, n, inner])
-                on_ground = rings[1, n, inner] + outside * (rings[1, n, inner + 1] - rings[1, n, inner])
-                on_figure += late[0, n, coarse_row, coarse_column]
-                on_ground += late[1, n, coarse_row, coarse_column]
-                place[column] = figure[column] * on_figure + ground[column] * on_ground
-            for column in range(columns):
-                share = 1.0
-                if shares.shape[0] > 0:
-                    moment = (direct.time[row, column] + times[n] - start) / step
-                    index = int(moment)
-                    share = shares[index] + (moment - index) * (shares[index + 1] - shares[index])
-                radiance[n, row, column] = straight[column] * share + place[column]
-            if n <= last_seen:
-                before, width = times[max(n - 1, 0)], times[n] - times[max(n - 1, 0)]
-                for column in range(columns):
-                    later = 1.0
-                    if n > 0:
-                        later = min(max((direct.return_time[row, column] - before) / width, 0.0), 1.0)
-                    scattered[column] += later * (place[column] - previous[column])
-                    previous[column] = place[column]
-        for column in range(columns):
-            picture[row, column] = scattered[column] * direct.reach[row, column]
+            ring, outer = ring_of(axes.radii, math.sqrt(x * x + y * y))
+            figure = coverage[row, column] / math.pi
+            ground = (1.0 - coverage[row, column]) / math.pi
+            line[:] = 0.0
+            _add_between(line, by_ring[0], ring + outer, figure)
+            _add_between(line, by_ring[1], ring + outer, ground)
+            if touched:
+                cell = coarse_row * axes.cells + int((column + 0.5) / columns * axes.cells)
+                _add(line, by_cell[0], cell, figure)
+                _add(line, by_cell[1], cell, ground)
+            for n in range(nodes):
+                picture[row, column] += direct.reach[row, column, n] * line[n]
+            straight = figure * direct.lit[0, row, column] + ground * direct.lit[1, row, column]
+            _add_between(line, gate, (direct.time[row, column] - start) / step, straight)
+            for n in range(times):
+                radiance[row, n, column] = line[n]
     return radiance, picture

@@ -20,15 +20,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from imclab.optics.surface import MICROFACET
-from imclab.transport.backscatter_walk import backscatter_walks, peak_angle
+from imclab.transport.backscatter_walk import backscatter_walks, way_home
 from imclab.transport.camera_walk import camera_walks
-from imclab.transport.direct_light import coverage_of, direct_light, rules_for
+from imclab.transport.direct_light import coverage_of, direct_light, nodes_reached, rules_for
 from imclab.transport.expected import glossy_pixels, left_out
 from imclab.transport.light_walk import LightMaps, MapAxes, light_walks
 from imclab.transport.next_event import GLOSSY_LAST, mirror_light, next_event_walks
 from imclab.transport.picture_grid import picture_grid
 from imclab.transport.runner import Estimator, Tally
-from imclab.transport.setup import PULSE_REACH, Setup
+from imclab.transport.setup import PULSE_REACH, Setup, first_return
 from imclab.transport.smooth_map import smooth_map
 from imclab.transport.swung_walk import collisions_swung, swung_walks
 from imclab.transport.target_radiance import gate_matrix, gate_table, gated_radiance, map_axes
@@ -36,10 +36,9 @@ from imclab.transport.two_sided_times import rings_seen, scattered_times
 
 FloatArray = NDArray[np.float64]
 
-BATCH_SIZE = 20_000
+BATCH_SIZE = 16_384
+"""A power of 2, for which Sobol's points are most even."""
 WALKS_SWUNG_PER_OTHER = 4
-ROW_STEP = 4
-"""A camera walk serves every fourth row: adding to fewer pixels leaves time for more walks."""
 
 
 def light_maps(
@@ -62,17 +61,19 @@ def make(setup: Setup) -> Estimator:
     coverage = coverage_of(setup.target.mask, *grid.cells)
     latest = setup.gate.closes + PULSE_REACH * setup.gate.sigma
     axes = map_axes(setup, latest)
-    direct = direct_light(setup, rules_for(setup), coverage)
+    reached = nodes_reached(setup, axes.times)
+    direct = direct_light(setup, rules_for(setup), coverage, axes.times, reached)
     exact = {"target": grid.pixels(direct.picture), "backscatter": np.zeros(grid.shape)}
     if setup.time.bins:
         exact["time"] = direct.times
     swung = collisions_swung(setup)
-    table, peak, glossy = gate_table(setup, axes, direct), peak_angle(setup), glossy_pixels(setup, grid)
+    table, home, glossy = gate_table(setup, axes, direct), way_home(setup, latest), glossy_pixels(setup, grid)
     shares = gate_matrix(setup, axes)
     unscattered = rings_seen(setup, axes, direct, coverage)
     veil_every = 2 if np.isfinite(latest) else 1  # a gate leaves little backscatter
-    scatters, shiny = setup.water.scattering > 0.0, glossy.size > 0
-    diffuse = {setup.target.figure.kind, setup.target.ground.kind} != {MICROFACET}
+    returns = latest > first_return(setup)
+    scatters, shiny = setup.water.scattering > 0.0, returns and glossy.size > 0
+    diffuse = returns and {setup.target.figure.kind, setup.target.ground.kind} != {MICROFACET}
 
     def batch(seed: int, first_history: int, count: int) -> Tally:
         cells, backscatter = np.zeros_like(coverage), np.zeros(veil.shape)
@@ -82,7 +83,7 @@ def make(setup: Setup) -> Estimator:
             maps = light_maps(setup, axes, swung, latest, run)
             rings = shares @ maps.impulses
             radiance, seen = gated_radiance(setup, axes, table, direct, coverage, rings, maps.late)
-            camera = camera_walks(setup, axes, direct, coverage, radiance, ROW_STEP, *run)
+            camera = camera_walks(setup, axes, direct, coverage, radiance, *run)
             cells = count * seen + camera.picture
             if setup.time.bins:
                 seen_rings = unscattered + camera.impulses / max(count, 1)
@@ -90,7 +91,7 @@ def make(setup: Setup) -> Estimator:
                 times += camera.times + count * scattered_times(setup, axes, arriving, seen_rings)
         if scatters:
             few, veiled = -(-count // veil_every), np.zeros(setup.time.bins)
-            backscatter_walks(setup, peak, latest, veil.tents, *run[:2], few, backscatter, veiled)
+            backscatter_walks(setup, home, latest, veil.tents, *run[:2], few, backscatter, veiled)
             backscatter *= count / max(few, 1)
             times += veiled * (count / max(few, 1))
         if scatters and shiny:

@@ -48,7 +48,7 @@ def rings_seen(setup: Setup, axes: MapAxes, direct: DirectLight, coverage: Float
     later = place - bin_
     known = bin_ < axes.impulse_bins - 1
     for material, share in enumerate((coverage, 1.0 - coverage)):
-        energy = share * direct.reach / np.pi
+        energy = share * direct.reach.sum(axis=-1) / np.pi
         for step_time, in_time in ((0, 1.0 - later), (1, later)):
             for step_ring, in_ring in ((0, 1.0 - outer), (1, outer)):
                 index = (bin_[known] + step_time, ring[known] + step_ring)

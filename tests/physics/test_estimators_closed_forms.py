@@ -129,11 +129,13 @@ def test_light_scattered_straight_back_is_left_to_the_estimator_that_can_meet_it
 def test_stated_errors_are_true() -> None:
     """Depth 4: of 200 seeds 63 to 73 % lie within one stated error of the truth, 93 to 97 % within two.
 
-    Truth is the mean of all. Errors half as large would hold no more than 40 %.
+    Truth is the mean of all. 200 draws alone have standard errors of 3.3 and 1.6 %, and the pixels of one
+    run go up and down together: one such error is allowed on either side. Errors half as large would hold no more
+    than 40 %. With more draws: ``python -m tests.figures.coverage``.
     """
     setup = setup_of(scene(4.0, gate=CENTRED, aperture=0.05, side=0.1, pixels=16))
     estimator = two_sided.make(setup)
-    runs, batches, packets = 200, 32, 500
+    runs, batches, packets = 200, 32, 512
     totals, pixels = np.empty((runs, batches)), np.empty((runs, batches, 16))
     for run in range(runs):
         for batch in range(batches):
@@ -143,7 +145,6 @@ def test_stated_errors_are_true() -> None:
     for values in (totals[..., None], pixels):
         mean, error = values.mean(axis=1), values.std(axis=1, ddof=1) / math.sqrt(batches)
         off = np.abs(mean - mean.mean(axis=0)) / error
-        slack = 0.0 if values.shape[-1] > 1 else 0.03  # 200 draws alone have a standard error of 0.033
-        assert 0.63 - slack < np.mean(off < 1.0) < 0.73 + slack
-        assert 0.93 - 0.5 * slack < np.mean(off < 2.0) < 0.97 + 0.5 * slack
+        assert 0.60 < np.mean(off < 1.0) < 0.76
+        assert 0.914 < np.mean(off < 2.0) < 0.986
         assert np.mean(off < 0.5) < 0.45
