@@ -130,8 +130,8 @@ def test_stated_errors_are_true() -> None:
     """Depth 4: of 200 seeds 63 to 73 % lie within one stated error of the truth, 93 to 97 % within two.
 
     Truth is the mean of all. 200 draws alone have standard errors of 3.3 and 1.6 %, and the pixels of one
-    run go up and down together: one such error is allowed on either side. Errors half as large would hold no more
-    than 40 %. With more draws: ``python -m tests.figures.coverage``.
+    run go up and down together: one such error is allowed on either side. Errors half as large would hold
+    no more than 40 %. With more draws: ``python -m tests.figures.coverage``.
     """
     setup = setup_of(scene(4.0, gate=CENTRED, aperture=0.05, side=0.1, pixels=16))
     estimator = two_sided.make(setup)
