@@ -41,6 +41,8 @@ class Contestant:
     name: str
     render: Callable[[int], FloatArray]
     truth: FloatArray
+    truth_error: float
+    """Relative standard error of the truth's sum."""
     cpu: list[float] = field(default_factory=list)
     pictures: list[FloatArray] = field(default_factory=list)
 
@@ -149,9 +151,9 @@ def check_clear_water(other: Mitransient) -> None:
 def check_agreement(theirs: Contestant) -> None:
     """Refuse to go on unless the pictures' sums agree within the errors between seeds."""
     totals = np.array(theirs.pictures).sum(axis=(1, 2)) / theirs.truth.sum()
-    error = totals.std(ddof=1) / len(totals) ** 0.5
+    error = float(np.hypot(totals.std(ddof=1) / len(totals) ** 0.5, theirs.truth_error))
     z = (totals.mean() - 1.0) / error
-    print(f"{theirs.name}: total / reference {totals.mean():.4f} +- {error:.4f}, Z = {z:.1f}", flush=True)
+    print(f"{theirs.name}: total / reference {totals.mean():.5f} +- {error:.5f}, Z = {z:.1f}", flush=True)
     if not abs(z) < threshold(1, degrees=len(totals) - 1):
         raise SystemExit("not the same job: no figures")
 
@@ -161,16 +163,20 @@ def contest(depth: float, other: Mitransient, arguments: argparse.Namespace) -> 
     scene = scene_at(depth)
     other.load(scene)
     reference = ours(scene, seed=REFERENCE_SEED, packets=LONG_RUN * PACKETS)
+    error = reference.relative_error
     everyone = [
-        Contestant("auto", lambda seed: ours(scene, seed=seed, packets=PACKETS).energy, reference.energy),
+        Contestant(
+            "auto", lambda seed: ours(scene, seed=seed, packets=PACKETS).energy, reference.energy, error
+        ),
         Contestant(
             "expected",
             lambda seed: ours(scene, seed=seed, packets=EXPECTED_PACKETS, estimator="expected").energy,
             reference.energy,
+            error,
         ),
     ]
     # mitransient is asked for light of the target's return and later: hardly any of the backscatter.
-    theirs = Contestant("mitransient", lambda _: np.zeros(0), reference.target)
+    theirs = Contestant("mitransient", lambda _: np.zeros(0), reference.target, error)
     for seed in range(arguments.seeds + 1):
         for one in everyone:
             one.run(seed)
