@@ -99,7 +99,7 @@ def _take_up(waiting: Any, place: Any) -> Any:
 
 
 @device
-def _new_direction(setup: Any, point: Any, direction: Any, peak: Any, draws: Any) -> Any:
+def new_direction(setup: Any, point: Any, direction: Any, peak: Any, draws: Any) -> Any:
     """Draw a scattered direction, perhaps around the way to the laser; return it and its weight.
 
     The join of a ray that misses the laser by an angle α is worth 1/α: around the way to the laser the
@@ -229,7 +229,7 @@ def backscatter_walks(
                     point[2] + free * direction[2],
                 )
                 path += free
-                direction, factor = _new_direction(
+                direction, factor = new_direction(
                     setup, point, direction, home.peak, (u_choice, u_scatter, u_azimuth)
                 )
                 weight *= factor * water.albedo

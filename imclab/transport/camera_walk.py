@@ -58,7 +58,7 @@ class CameraTally(NamedTuple):
 
 
 @device
-def _span(centre: Any, radius: Any, half_size: Any, pitch: Any, inside: Any) -> Any:
+def span(centre: Any, radius: Any, half_size: Any, pitch: Any, inside: Any) -> Any:
     """Return first and last index (exclusive) of points (i + inside) pitch − half_size within a radius."""
     low = math.ceil((centre - radius + half_size) / pitch - inside)
     high = math.floor((centre + radius + half_size) / pitch - inside) + 1.0
@@ -84,12 +84,12 @@ def _add_moved(
     if abs(shift_y) >= rows or abs(shift_x) >= columns:
         return
     down, right = int(shift_y), int(shift_x)
-    top, bottom = _span(centre[1], radius, target.half_height, pitch_y, inside[1])
+    top, bottom = span(centre[1], radius, target.half_height, pitch_y, inside[1])
     seen, source, part = picture.ravel(), radiance.ravel(), np.float32(energy)
     for row in range(max(top, -down), min(bottom, rows - down)):
         height = (row + inside[1]) * pitch_y - target.half_height - centre[1]
         half = math.sqrt(max(radius * radius - height * height, 0.0))
-        left, end = _span(centre[0], half, target.half_width, pitch_x, inside[0])
+        left, end = span(centre[0], half, target.half_width, pitch_x, inside[0])
         left, end = max(left, -right), min(end, columns - right)
         here = np.uint64(row * columns + left)
         there = np.uint64(((row + down) * times + node) * columns + left + right)

@@ -33,9 +33,6 @@ MIRROR_SAMPLES = 4
 
 _SHARPEST = 1e200
 
-UNTOUCHED, DIFFUSE_LAST, GLOSSY_LAST = 0, 1, 2
-"""What light has met on the target last."""
-
 
 @device
 def _way_to_aperture(receiver: Any, point: Any, u_radius: Any, u_angle: Any) -> Any:
@@ -102,13 +99,12 @@ def _vertex_value(setup: Any, point: Any, incoming: Any, on_target: Any, leaving
 
 @cached_kernel
 def next_event_walks(
-    setup: Any, least: int, latest: float, seed: Any, first: Any, count: int, picture: Any, times: Any
+    setup: Any, latest: float, seed: Any, first: Any, count: int, picture: Any, times: Any
 ) -> None:
     """Add the scores of ``count`` packets to the picture of target light.
 
     Light that goes from laser to target to aperture unscattered is left out: it has its own ways
-    (`direct_light`, `mirror_light`). Scored is light whose last meeting with the target ranks at least
-    as ``least``: `DIFFUSE_LAST` for all of it, `GLOSSY_LAST` for that of glossy surfaces.
+    (`direct_light`, `mirror_light`), and so is light that has not met the target (`backscatter_walk`).
     """
     water, target, receiver = setup.water, setup.target, setup.receiver
     mean_free_path = 1.0 / max(water.attenuation, 1e-30)
@@ -116,7 +112,7 @@ def next_event_walks(
     for i in range(count):
         history = first + np.uint64(i)
         point, direction = launch(setup.beam, seed, history)
-        weight, path, met, on_target, order = 1.0, 0.0, UNTOUCHED, False, 0
+        weight, path, met, on_target, order = 1.0, 0.0, False, False, 0
         for event in range(1, MOST_EVENTS):
             u_free, u_scatter, u_azimuth, dice = uniforms(seed, history, event, NEXT_EVENT_STREAM)
             way, exits = 1e30, False
@@ -144,14 +140,14 @@ def next_event_walks(
                 w_in = (-incoming[0], -incoming[1], incoming[2])
                 w_out, factor = sample_surface(surface, w_in, u_scatter, u_azimuth)
                 direction = (w_out[0], w_out[1], -w_out[2])
-                met = GLOSSY_LAST if surface.kind == MICROFACET else DIFFUSE_LAST
+                met = True
             else:
                 angle = 2.0 * math.pi * u_azimuth
                 deviation = sample_deviation(setup.phase, u_scatter)
                 direction = turn(incoming, deviation, math.sin(angle), math.cos(angle))
                 factor = water.albedo
                 order += 1
-            scored = order > 0 and met >= least
+            scored = order > 0 and met
             if scored:
                 u_radius, u_angle, _, _ = uniforms(seed, history, event, NEXT_EVENT_STREAM + 1)
                 leaving, distance, even = _way_to_aperture(receiver, point, u_radius, u_angle)

@@ -6,8 +6,9 @@ The picture is a sum of parts, by what the light has met on the target last:
 - a diffuse surface, scattered before it only: walks from the laser (`light_walk`), seen unscattered;
 - a diffuse surface, scattered after it: walks from the camera (`camera_walk`), which end on the target
   lit by both;
-- a glossy surface: walks from the laser with next events (`next_event`), since the light that leaves
-  depends on the direction it came from;
+- a glossy surface, unscattered both ways: each pixel is sampled in turn (`next_event.mirror_light`);
+- a glossy surface, scattered: walks from the camera that are reflected and joined with the beam
+  (`glossy_walk`), and the laser's image in the target seen through the water (`mirror_veil`);
 - nothing: walks from the camera joined with the beam (`backscatter_walk`).
 
 Light and camera walks meet batch by batch. Both sides of a batch are independent, so the mean of their
@@ -24,8 +25,10 @@ from imclab.transport.backscatter_walk import backscatter_walks, way_home
 from imclab.transport.camera_walk import camera_walks
 from imclab.transport.direct_light import coverage_of, direct_light, nodes_reached, rules_for
 from imclab.transport.expected import glossy_pixels, left_out
+from imclab.transport.glossy_walk import glossy_walks, largest_roughness, mirrored_walks
 from imclab.transport.light_walk import LightMaps, MapAxes, light_walks
-from imclab.transport.next_event import GLOSSY_LAST, mirror_light, next_event_walks
+from imclab.transport.mirror_veil import mirror_veil
+from imclab.transport.next_event import mirror_light
 from imclab.transport.picture_grid import picture_grid
 from imclab.transport.runner import Estimator, Tally
 from imclab.transport.setup import PULSE_REACH, Setup, first_return
@@ -39,6 +42,9 @@ FloatArray = NDArray[np.float64]
 BATCH_SIZE = 16_384
 """A power of 2, for which Sobol's points are most even."""
 WALKS_SWUNG_PER_OTHER = 4
+PACKETS_PER_VEIL = 32
+"""A place of the mirror's veil serves thousands of pixels and costs as much as tens of walks."""
+VEIL_WALKS_PER_PACKET = 2
 
 
 def light_maps(
@@ -55,6 +61,31 @@ def light_maps(
     return LightMaps(*(a / max(count, 1) + b / max(few, 1) for a, b in pairs))
 
 
+def scattered_glossy(
+    setup: Setup,
+    glossy: NDArray[np.int64],
+    roughness: float,
+    peak: float,
+    latest: float,
+    run: tuple[np.uint64, np.uint64, int],
+    picture: FloatArray,
+    times: FloatArray,
+) -> None:
+    """Add the scattered light that has met a glossy surface last: three kinds, each with its own walks."""
+    seed, first, count = run
+    mirrored_walks(setup, glossy, roughness, peak, latest, *run, picture, times)
+    many, few = VEIL_WALKS_PER_PACKET * count, -(-count // PACKETS_PER_VEIL)
+    start = first * np.uint64(VEIL_WALKS_PER_PACKET)
+    part, parted = np.zeros_like(picture), np.zeros_like(times)
+    glossy_walks(setup, roughness, peak, latest, seed, start, many, part, parted)
+    picture += part / VEIL_WALKS_PER_PACKET
+    times += parted / VEIL_WALKS_PER_PACKET
+    part[:], parted[:] = 0.0, 0.0
+    mirror_veil(setup, roughness, latest, seed, first, few, part, parted)
+    picture += part * (count / max(few, 1))
+    times += parted * (count / max(few, 1))
+
+
 def make(setup: Setup) -> Estimator:
     """Return the two-sided estimator of a set-up."""
     grid, veil = picture_grid(setup), smooth_map(setup)
@@ -68,7 +99,7 @@ def make(setup: Setup) -> Estimator:
         exact["time"] = direct.times
     swung = collisions_swung(setup)
     table, home, glossy = gate_table(setup, axes, direct), way_home(setup, latest), glossy_pixels(setup, grid)
-    shares = gate_matrix(setup, axes)
+    shares, roughness = gate_matrix(setup, axes), largest_roughness(setup)
     unscattered = rings_seen(setup, axes, direct, coverage)
     veil_every = 2 if np.isfinite(latest) else 1  # a gate leaves little backscatter
     returns = latest > first_return(setup)
@@ -95,7 +126,7 @@ def make(setup: Setup) -> Estimator:
             backscatter *= count / max(few, 1)
             times += veiled * (count / max(few, 1))
         if scatters and shiny:
-            next_event_walks(setup, GLOSSY_LAST, latest, *run, mirrored, times)
+            scattered_glossy(setup, glossy, roughness, home.peak, latest, run, mirrored, times)
         if shiny:
             mirror_light(setup, glossy, *run, mirrored, times)
         tally = {"target": grid.pixels(cells) + mirrored, "backscatter": veil.picture(backscatter)}
