@@ -173,7 +173,8 @@ def glossy_walks(
 ) -> None:
     """Add ``count`` walks that the water scatters on the way from camera to target, all pixels alike.
 
-    ``roughness`` is that of `largest_roughness`, ``peak`` that of `way_home`; ``picture`` and the impulse ``times`` are sums over walks.
+    ``roughness`` is that of `largest_roughness`, ``peak`` that of `way_home`; ``picture`` and the impulse
+    ``times`` are sums over walks.
     """
     water, target = setup.water, setup.target
     rows, columns = picture.shape

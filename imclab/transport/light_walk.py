@@ -16,10 +16,12 @@ from numpy.typing import NDArray
 
 from imclab.optics.surface import MICROFACET
 from imclab.transport.analog import surface_at
+from imclab.transport.beam_field import beam_irradiance
+from imclab.transport.beam_join import deviation_of
 from imclab.transport.gathering import gate_share
 from imclab.transport.kernel_cache import cached_kernel, device
 from imclab.transport.random import uniforms
-from imclab.transport.scattering import sample_deviation, turn
+from imclab.transport.scattering import phase_density, sample_deviation, turn
 from imclab.transport.surfaces import cosine_law_reflectance
 from imclab.transport.surfaces import sample as sample_surface
 
@@ -28,8 +30,10 @@ FloatArray = NDArray[np.float64]
 LIGHT_STREAM = 11
 ROULETTE_WEIGHT = 0.02
 ROULETTE_CHANCE = 0.2
-REFLECTED_FIRST = 0.1
-"""Share of walks that begin with light reflected by the target before it met the water."""
+REFLECTED_FIRST = 0.2
+"""Share of walks that begin on the target, with light that has reached it unscattered."""
+NEAREST = 1e-3
+"""Shortest flight from the target that is drawn more often than it happens, in half sides of the target."""
 MOST_EVENTS = 100_000
 
 
@@ -98,6 +102,30 @@ def launch(beam: Any, seed: Any, history: Any) -> Any:
 
 
 @device
+def launch_from_target(setup: Any, seed: Any, history: Any) -> Any:
+    """Begin a walk with light that the target has reflected, unscattered before, at a place drawn evenly.
+
+    Returns the place, the direction, the weight and the path behind it; the direction's z is 0 where the
+    surface absorbs all.
+    """
+    target, water = setup.target, setup.water
+    u_x, u_y, u_size, u_angle = uniforms(seed, history, 0, LIGHT_STREAM)
+    u_polar, u_azimuth, _, _ = uniforms(seed, history, 0, LIGHT_STREAM + 1)
+    place = (
+        (2.0 * u_x - 1.0) * target.half_width,
+        (2.0 * u_y - 1.0) * target.half_height,
+        target.distance,
+    )
+    size, angle = math.sqrt(-2.0 * math.log(u_size)), 2.0 * math.pi * u_angle
+    lit, incoming, path = beam_irradiance(setup.beam, place, size * math.cos(angle), size * math.sin(angle))
+    arriving = (-incoming[0], -incoming[1], incoming[2])
+    leaving, factor = sample_surface(surface_at(target, place), arriving, u_polar, u_azimuth)
+    area = 4.0 * target.half_width * target.half_height
+    weight = lit * incoming[2] * area * factor * math.exp(-water.attenuation * path)
+    return place, (leaving[0], leaving[1], -leaving[2] if factor > 0.0 else 0.0), weight, path
+
+
+@device
 def ring_of(radii: Any, radius: Any) -> Any:
     """Return the ring inside a radius and how far (0 to 1) the radius lies toward the next."""
     ring = min(np.searchsorted(radii, radius, side="right"), radii.shape[0] - 1) - 1
@@ -146,6 +174,50 @@ def empty_maps(axes: Any) -> Any:
     )
 
 
+@device
+def _flight_from_target(setup: Any, direction: Any, u: Any) -> Any:
+    """Draw a flight away from the target that ends in the water; return it and the factor of the weight.
+
+    Light that is scattered close to the target lands again with all its weight, and seldom starts: half of the
+    flights are drawn evenly in the logarithm of distance.
+    """
+    water, target = setup.water, setup.target
+    longest = -target.distance / direction[2]
+    nearest = NEAREST * min(target.half_width, target.half_height, longest)
+    into, ratio = -math.expm1(-water.attenuation * longest), math.log(longest / nearest)
+    if u < 0.5:
+        free = -math.log1p(-2.0 * u * into) / max(water.attenuation, 1e-30)
+    else:
+        free = nearest * math.exp((2.0 * u - 1.0) * ratio)
+    wanted = water.attenuation * math.exp(-water.attenuation * free)
+    drawn = 0.5 * wanted / into + (0.5 / (free * ratio) if free > nearest else 0.0)
+    return min(free, (1.0 - 1e-12) * longest), wanted / drawn
+
+
+@device
+def _connect(setup: Any, axes: Any, maps: Any, ray: Any, state: Any, draws: Any) -> None:
+    """Score light scattered toward an evenly drawn place of the target, weighed against going on there.
+
+    ``ray`` is (point, direction before the scattering), ``state`` (weight after it, path, farthest). Light
+    that comes back has to turn round: few walks do so by themselves, and those few ruled the error.
+    """
+    target, water = setup.target, setup.water
+    (point, direction), (weight, path, farthest) = ray, state
+    x, y = (2.0 * draws[0] - 1.0) * target.half_width, (2.0 * draws[1] - 1.0) * target.half_height
+    dx, dy, dz = x - point[0], y - point[1], target.distance - point[2]
+    square = dx * dx + dy * dy + dz * dz
+    way = math.sqrt(square)
+    if dz <= 0.0 or path + way > farthest:
+        return
+    toward = (dx / way, dy / way, dz / way)
+    scattered = phase_density(setup.phase, deviation_of(direction, toward))
+    even = square / (4.0 * target.half_width * target.half_height * toward[2])
+    energy = weight * scattered / (scattered + even) * math.exp(-water.attenuation * way)
+    figure = energy * diffuse_albedo(target.figure, toward[2])
+    ground = energy * diffuse_albedo(target.ground, toward[2])
+    score(setup, axes, maps, True, (x, y), (figure, ground), (path + way) / water.group_velocity)
+
+
 @cached_kernel
 def light_walks(
     setup: Any, axes: MapAxes, swung: int, latest: float, seed: Any, first: Any, count: int
@@ -153,7 +225,8 @@ def light_walks(
     """Walk ``count`` packets and return the `LightMaps` of scattered light on the target, summed.
 
     The unscattered light on the target is left out: it is computed. Walks therefore begin with a
-    collision forced before the target, or (the share `REFLECTED_FIRST`) with a reflection. After every
+    collision forced before the target, or (the share `REFLECTED_FIRST`) reflected by a place of the
+    target drawn evenly: few walks of a wide beam would find a small target. After every
     collision the chance of reaching the target unscattered is scored. A walk ends when it leaves, when
     it can no longer land by ``latest`` (s), or by Russian roulette. Light that has not met the target is
     left to `swung_walks` when it comes from up to ``swung`` collisions, all of them nearer to the start
@@ -162,26 +235,31 @@ def light_walks(
     water, target = setup.water, setup.target
     maps = empty_maps(axes)
     mean_free_path = 1.0 / max(water.attenuation, 1e-30)
-    farthest = latest * water.group_velocity
+    farthest, area = latest * water.group_velocity, 4.0 * target.half_width * target.half_height
+    deviation = 0.0
     for i in range(count):
         history = first + np.uint64(i)
-        (x, y, z), direction = launch(setup.beam, seed, history)
-        if direction[2] <= 0.0:
-            continue
-        way = target.distance / direction[2]
-        through = math.exp(-water.attenuation * way)
         choice, u_free, u_scatter, u_azimuth = uniforms(seed, history, 1, LIGHT_STREAM)
-        start, path, touched, farthest_square = (x, y), 0.0, False, 0.0
-        collisions = 0
-        at_target = choice < REFLECTED_FIRST
-        if at_target:
-            weight, free = through / REFLECTED_FIRST, way
+        touched, farthest_square, collisions, at_target = choice < REFLECTED_FIRST, 0.0, 0, False
+        if touched:
+            point, direction, weight, path = launch_from_target(setup, seed, history)
+            if direction[2] >= 0.0:
+                continue
+            free, share = _flight_from_target(setup, direction, u_free)
+            weight *= share / REFLECTED_FIRST
         else:
-            weight = (1.0 - through) / (1.0 - REFLECTED_FIRST)
-            free = -math.log1p(-u_free * (1.0 - through)) * mean_free_path
+            point, direction = launch(setup.beam, seed, history)
+            if direction[2] <= 0.0:
+                continue
+            path, into = 0.0, -math.expm1(-water.attenuation * target.distance / direction[2])
+            weight = into / (1.0 - REFLECTED_FIRST)
+            free = -math.log1p(-u_free * into) * mean_free_path
+        (x, y, z), start = point, (point[0], point[1])
+        floor = ROULETTE_WEIGHT * min(weight, 1.0)
         for event in range(2, MOST_EVENTS):
             x, y, z = x + free * direction[0], y + free * direction[1], z + free * direction[2]
             path += free
+            was_at_target, incoming = at_target, direction
             if at_target:
                 z = target.distance
                 if abs(x) >= target.half_width or abs(y) >= target.half_height:
@@ -200,11 +278,14 @@ def light_walks(
                 angle = 2.0 * math.pi * u_azimuth
                 deviation = sample_deviation(setup.phase, u_scatter)
                 direction = turn(direction, deviation, math.sin(angle), math.cos(angle))
-            if weight < ROULETTE_WEIGHT:
+            if weight < floor:
                 dice, _, _, _ = uniforms(seed, history, event, LIGHT_STREAM + 1)
                 if weight == 0.0 or dice > ROULETTE_CHANCE:
                     break
                 weight /= ROULETTE_CHANCE
+            if touched and not was_at_target:
+                draws = uniforms(seed, history, event, LIGHT_STREAM + 2)
+                _connect(setup, axes, maps, ((x, y, z), incoming), (weight, path, farthest), draws)
             # not the way ahead but the shortest: a grazing walk may yet be turned toward the target
             if path + (target.distance - z) > farthest:
                 break
@@ -219,11 +300,18 @@ def light_walks(
                 in_time = path + way <= farthest
                 if in_time and (touched or collisions > swung or farthest_square >= ball):
                     time = (path + way) / water.group_velocity
-                    score(setup, axes, maps, touched, place, (figure, ground), time)
+                    own = 1.0
+                    if touched:  # weighed against the connection below
+                        drawn = phase_density(setup.phase, deviation)
+                        own = drawn / (drawn + way * way / (area * direction[2]))
+                    score(setup, axes, maps, touched, place, (own * figure, own * ground), time)
             elif direction[2] < 0.0:
                 way = -z / direction[2]
             _, u_free, u_scatter, u_azimuth = uniforms(seed, history, event, LIGHT_STREAM)
-            free = -math.log(u_free) * mean_free_path
+            free, share = -math.log(u_free) * mean_free_path, 1.0
+            if was_at_target and direction[2] < 0.0:
+                free, share = _flight_from_target(setup, direction, u_free)
+            weight *= share
             at_target = free >= way
             if at_target:
                 if direction[2] < 0.0:
