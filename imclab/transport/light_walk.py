@@ -30,7 +30,7 @@ FloatArray = NDArray[np.float64]
 LIGHT_STREAM = 11
 ROULETTE_WEIGHT = 0.02
 ROULETTE_CHANCE = 0.2
-REFLECTED_FIRST = 0.2
+REFLECTED_FIRST = 0.1
 """Share of walks that begin on the target, with light that has reached it unscattered."""
 NEAREST = 1e-3
 """Shortest flight from the target that is drawn more often than it happens, in half sides of the target."""
@@ -102,26 +102,32 @@ def launch(beam: Any, seed: Any, history: Any) -> Any:
 
 
 @device
-def launch_from_target(setup: Any, seed: Any, history: Any) -> Any:
-    """Begin a walk with light that the target has reflected, unscattered before, at a place drawn evenly.
+def _reflected_first(setup: Any, wide: bool, seed: Any, history: Any) -> Any:
+    """Begin a walk with light that the target has reflected, unscattered before.
 
+    A place of the target is drawn evenly where the beam is wider than the target, else by following the beam.
     Returns the place, the direction, the weight and the path behind it; the direction's z is 0 where the
-    surface absorbs all.
+    beam misses the target or the surface absorbs all.
     """
     target, water = setup.target, setup.water
-    u_x, u_y, u_size, u_angle = uniforms(seed, history, 0, LIGHT_STREAM)
     u_polar, u_azimuth, _, _ = uniforms(seed, history, 0, LIGHT_STREAM + 1)
-    place = (
-        (2.0 * u_x - 1.0) * target.half_width,
-        (2.0 * u_y - 1.0) * target.half_height,
-        target.distance,
-    )
-    size, angle = math.sqrt(-2.0 * math.log(u_size)), 2.0 * math.pi * u_angle
-    lit, incoming, path = beam_irradiance(setup.beam, place, size * math.cos(angle), size * math.sin(angle))
+    if wide:
+        u_x, u_y, u_size, u_angle = uniforms(seed, history, 0, LIGHT_STREAM)
+        x, y = (2.0 * u_x - 1.0) * target.half_width, (2.0 * u_y - 1.0) * target.half_height
+        size, angle = math.sqrt(-2.0 * math.log(u_size)), 2.0 * math.pi * u_angle
+        offset = (size * math.cos(angle), size * math.sin(angle))
+        lit, incoming, path = beam_irradiance(setup.beam, (x, y, target.distance), offset[0], offset[1])
+        weight = lit * incoming[2] * 4.0 * target.half_width * target.half_height
+    else:
+        start, incoming = launch(setup.beam, seed, history)
+        path, weight = target.distance / max(incoming[2], 1e-12), 1.0
+        x, y = start[0] + path * incoming[0], start[1] + path * incoming[1]
+    place = (x, y, target.distance)
+    if incoming[2] <= 0.0 or abs(x) >= target.half_width or abs(y) >= target.half_height:
+        return place, (1.0, 0.0, 0.0), 0.0, path
     arriving = (-incoming[0], -incoming[1], incoming[2])
     leaving, factor = sample_surface(surface_at(target, place), arriving, u_polar, u_azimuth)
-    area = 4.0 * target.half_width * target.half_height
-    weight = lit * incoming[2] * area * factor * math.exp(-water.attenuation * path)
+    weight *= factor * math.exp(-water.attenuation * path)
     return place, (leaving[0], leaving[1], -leaving[2] if factor > 0.0 else 0.0), weight, path
 
 
@@ -178,8 +184,8 @@ def empty_maps(axes: Any) -> Any:
 def _flight_from_target(setup: Any, direction: Any, u: Any) -> Any:
     """Draw a flight away from the target that ends in the water; return it and the factor of the weight.
 
-    Light that is scattered close to the target lands again with all its weight, and seldom starts: half of the
-    flights are drawn evenly in the logarithm of distance.
+    Light that is scattered close to the target lands again with all its weight, and that is rare: half of
+    the flights are drawn evenly in the logarithm of distance.
     """
     water, target = setup.water, setup.target
     longest = -target.distance / direction[2]
@@ -225,8 +231,7 @@ def light_walks(
     """Walk ``count`` packets and return the `LightMaps` of scattered light on the target, summed.
 
     The unscattered light on the target is left out: it is computed. Walks therefore begin with a
-    collision forced before the target, or (the share `REFLECTED_FIRST`) reflected by a place of the
-    target drawn evenly: few walks of a wide beam would find a small target. After every
+    collision forced before the target, or (the share `REFLECTED_FIRST`) reflected by the target. After every
     collision the chance of reaching the target unscattered is scored. A walk ends when it leaves, when
     it can no longer land by ``latest`` (s), or by Russian roulette. Light that has not met the target is
     left to `swung_walks` when it comes from up to ``swung`` collisions, all of them nearer to the start
@@ -242,7 +247,7 @@ def light_walks(
         choice, u_free, u_scatter, u_azimuth = uniforms(seed, history, 1, LIGHT_STREAM)
         touched, farthest_square, collisions, at_target = choice < REFLECTED_FIRST, 0.0, 0, False
         if touched:
-            point, direction, weight, path = launch_from_target(setup, seed, history)
+            point, direction, weight, path = _reflected_first(setup, swung > 0, seed, history)
             if direction[2] >= 0.0:
                 continue
             free, share = _flight_from_target(setup, direction, u_free)
