@@ -17,6 +17,7 @@ from imclab.registration import sampling
 from imclab.registration.appearance import BACKGROUND, FULL, PLAIN, Fields, slopes, terms
 from imclab.registration.motion import Matrix, Prior, moved_back, stepped, velocities
 from imclab.registration.reference import Reference
+from imclab.registration.whitening import Noise
 
 Vector = NDArray[np.float64]
 
@@ -24,6 +25,8 @@ _HUBER = 3.0
 """Residuals beyond so many standard deviations count linearly."""
 _CONVERGED_PX = 2e-3
 _LONGEST_STEP_PX = 3.0
+_SHARPEST = -0.8
+"""Variance of the blur when the frame is sharper than the simulated picture, in px²."""
 _LARGEST_BLUR = 0.25
 """Of the target's radius: beyond this nothing of the figure is left to recognise."""
 
@@ -55,13 +58,17 @@ class Linearised:
     slopes : float64 array (parameters + 1, n)
         Derivatives of the model by motion and blur.
     amplitudes : float64 array (terms,)
-    residual, weight : float64 arrays (n,)
+    value, residual, weight : float64 arrays (n,)
+        What was measured, what the model leaves of it, and how much each pixel counts.
+
+    All are whitened where the fit was given a noise.
     """
 
     state: State
     linear: Vector
     slopes: Vector
     amplitudes: Vector
+    value: Vector
     residual: Vector
     weight: Vector
 
@@ -78,9 +85,36 @@ class Linearised:
         coupling = _least_squares(self.linear, self.weight, self.slopes.T)
         return self.slopes - coupling.T @ self.linear
 
-    def explained(self, value: Vector) -> float:
+    def explained(self) -> float:
         """Share of the frame's structure, beyond the background, that the figure explains."""
-        return _explained(self.linear, self.weight, value)
+        return _explained(self.linear, self.weight, self.value)
+
+
+class Task(NamedTuple):
+    """What stays the same during a fit."""
+
+    reference: Reference
+    pixels: Pixels
+    parameters: int
+    term_count: int
+    noise: Noise | None
+
+    def linearised(self, state: State, weight: Vector) -> Linearised:
+        """Return the model at a state, its amplitudes solved for under the weights."""
+        x, y = moved_back(state.matrix, self.pixels.x, self.pixels.y)
+        fields = _fields(self.reference, self.pixels, state.blur, x, y)
+        linear = self._whitened(terms(fields, self.term_count))
+        value = self._whitened(self.pixels.value[None])[0]
+        amplitudes = _least_squares(linear, weight, value)
+        by_x, by_y, by_blur = slopes(fields, amplitudes)
+        frame = self.reference.frame
+        speeds = velocities((x - frame.x) / frame.radius, (y - frame.y) / frame.radius, self.parameters)
+        by_motion = [-frame.radius * (by_x * p + by_y * q) for p, q in speeds]
+        by_all = self._whitened(np.stack([*by_motion, by_blur]))
+        return Linearised(state, linear, by_all, amplitudes, value, value - amplitudes @ linear, weight)
+
+    def _whitened(self, fields: Vector) -> Vector:
+        return fields if self.noise is None else self.noise.whitened(fields)
 
 
 def choose_pixels(frame: Pixels, reference: Reference, matrix: Matrix) -> Pixels:
@@ -116,20 +150,20 @@ def fit(
     steps: int,
     term_count: int = FULL,
     prior: Prior | None = None,
+    noise: Noise | None = None,
 ) -> Linearised:
     """Fit motion and blur from a start; return the model at the best state found."""
-    best = _reweighted(
-        _linearised(reference, pixels, start, parameters, term_count, np.ones_like(pixels.value))
-    )
+    task = Task(reference, pixels, parameters, term_count, noise)
+    best = _reweighted(task.linearised(start, np.ones_like(pixels.value)))
     damping = 1e-3
     largest = (_LARGEST_BLUR * reference.frame.radius) ** 2
     for _ in range(steps):
         step = _step(best, damping, reference, prior)
         reach = float(np.abs(step[:-1]).max()) * reference.frame.radius
         step = step * min(1.0, _LONGEST_STEP_PX / max(reach, 1e-12))
-        blur = float(np.clip(best.state.blur + step[-1], 0.25 * best.state.blur, 4 * best.state.blur + 0.5))
+        blur = float(np.clip(best.state.blur + step[-1], *_near(best.state.blur)))
         state = State(stepped(best.state.matrix, step[:-1], reference.frame), min(blur, largest))
-        trial = _linearised(reference, pixels, state, parameters, term_count, best.weight)
+        trial = task.linearised(state, best.weight)
         if _objective(trial, best.weight, reference, prior) <= _objective(
             best, best.weight, reference, prior
         ):
@@ -149,19 +183,9 @@ def _objective(model: Linearised, weight: Vector, reference: Reference, prior: P
     return model.cost(weight) + penalty
 
 
-def _linearised(
-    reference: Reference, pixels: Pixels, state: State, parameters: int, term_count: int, weight: Vector
-) -> Linearised:
-    x, y = moved_back(state.matrix, pixels.x, pixels.y)
-    fields = _fields(reference, pixels, state.blur, x, y)
-    linear = terms(fields, term_count)
-    amplitudes = _least_squares(linear, weight, pixels.value)
-    by_x, by_y, by_blur = slopes(fields, amplitudes)
-    frame = reference.frame
-    speeds = velocities((x - frame.x) / frame.radius, (y - frame.y) / frame.radius, parameters)
-    by_motion = [-frame.radius * (by_x * p + by_y * q) for p, q in speeds]
-    residual = pixels.value - amplitudes @ linear
-    return Linearised(state, linear, np.stack([*by_motion, by_blur]), amplitudes, residual, weight)
+def _near(blur: float) -> tuple[float, float]:
+    """Least and largest variance of the blur that one step may lead to."""
+    return max(min(0.25 * blur, blur - 0.3), _SHARPEST), 4 * max(blur, 0.0) + 0.5
 
 
 def _fields(reference: Reference, pixels: Pixels, blur: float, x: Vector, y: Vector) -> Fields:

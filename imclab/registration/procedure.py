@@ -11,12 +11,13 @@ from numpy.typing import ArrayLike, NDArray
 from imclab.errors import Fault, InputError
 from imclab.registration.appearance import PLAIN
 from imclab.registration.coarse import candidates
-from imclab.registration.fit import Pixels, State, choose_pixels, fit
+from imclab.registration.fit import Linearised, Pixels, State, choose_pixels, fit
 from imclab.registration.motion import PARAMETERS, Matrix, Prior, magnification, simplified
 from imclab.registration.reference import Reference, prepare
 from imclab.registration.result import Registration
 from imclab.registration.uncertainty import leftover
 from imclab.registration.verdict import Found, judged, nothing
+from imclab.registration.whitening import grid_of, noise_of
 
 _CANDIDATES = 3
 _COARSE_RADIUS = 8.0
@@ -24,6 +25,8 @@ _COARSE_RADIUS = 8.0
 _MOST_PIXELS = 80_000
 """Above this the frame is binned once more: edges that are blurred over pixels lose nothing."""
 _FEWEST_PIXELS = 80
+_OUTLIER = 4.0
+"""Standard deviations at which a residual is cut before the noise is read from it."""
 _SMALLEST_SIDE = 24
 
 
@@ -130,7 +133,7 @@ def _best_start(reference: Reference, clean: NDArray[np.float64]) -> State | Non
             continue
         start = State(candidate.matrix, 9.0)
         model = fit(reference, pixels, start, parameters=PARAMETERS["similarity"], steps=8, term_count=PLAIN)
-        share = model.explained(pixels.value)
+        share = model.explained()
         if share > best_share:
             best, best_share = model.state, share
     return best
@@ -147,12 +150,34 @@ def _refined(reference: Reference, pyramid: _Pyramid, start: State, model: str) 
         pixels = choose_pixels(pyramid.pixels(width), reference, state.matrix)
         if pixels.x.size < _FEWEST_PIXELS:
             continue
-        fitted = fit(reference, pixels, state, parameters=count, steps=steps, prior=prior)
+        if found is not None and found.pixels.width == width:
+            fitted = _whitened_fit(reference, found, steps)
+            pixels = found.pixels
+        else:
+            fitted = fit(reference, pixels, state, parameters=count, steps=steps, prior=prior)
         state = fitted.state
         left = leftover(fitted, pixels)
         prior = Prior(left.noise, reference.perspective)
         found = Found(fitted, pixels, left, prior, model)
     return found
+
+
+def _whitened_fit(reference: Reference, found: Found, steps: int) -> Linearised:
+    """Fit once more with the noise that the last fit left over; outliers are cut first."""
+    model, pixels = found.model, found.pixels
+    brightness = pixels.value - model.residual
+    spread = _OUTLIER * 1.4826 * float(np.median(np.abs(model.residual)))
+    kept = np.clip(model.residual, -spread, spread)
+    noise = noise_of(kept, brightness, grid_of(pixels.x, pixels.y, pixels.width))
+    return fit(
+        reference,
+        pixels._replace(value=brightness + kept),
+        model.state,
+        parameters=PARAMETERS[found.name],
+        steps=steps,
+        prior=found.prior._replace(noise=1.0),
+        noise=noise,
+    )
 
 
 def _simplest(reference: Reference, pyramid: _Pyramid, start: State) -> str:

@@ -19,13 +19,18 @@ _REACH = 10
 
 
 def coefficients(picture: NDArray[np.float64], variance: float) -> NDArray[np.float64]:
-    """Return B-spline coefficients of the picture blurred by a Gaussian of ``variance`` px²."""
+    """Return B-spline coefficients of the picture blurred by a Gaussian of ``variance`` px².
+
+    A small negative variance sharpens to first order, by the same diffusion equation.
+    """
     offset = np.arange(-_REACH, _REACH + 1)
     kernel = -6 * _POLE / (1 - _POLE**2) * _POLE ** np.abs(offset)
     if variance > 1e-6:
         reach = int(np.ceil(4 * np.sqrt(variance))) + 1
         blur = np.exp(-0.5 * np.arange(-reach, reach + 1) ** 2 / variance)
         kernel = np.convolve(kernel, blur / blur.sum())
+    elif variance < 0:
+        kernel = np.convolve(kernel, [variance / 2, 1 - variance, variance / 2])
     return np.asarray(cv2.sepFilter2D(picture, cv2.CV_64F, kernel, kernel, borderType=cv2.BORDER_REFLECT_101))
 
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from imclab.registration.fit import Linearised, Pixels
 from imclab.registration.motion import Prior
 from imclab.registration.reference import Reference
+from imclab.registration.whitening import grid_of
 
 _REACH = 8
 """Largest lag of the auto-covariance, in pixels of the frame."""
@@ -52,10 +53,7 @@ class Leftover(NamedTuple):
 
 def leftover(model: Linearised, pixels: Pixels) -> Leftover:
     """Describe the residual of a fit: local strength, auto-correlation, independent noise."""
-    rows, cols = (
-        ((place - place.min()) / pixels.width).round().astype(int) for place in (pixels.y, pixels.x)
-    )
-    shape = (int(rows.max()) + 1, int(cols.max()) + 1)
+    rows, cols, shape = grid_of(pixels.x, pixels.y, pixels.width)
     residual, present = np.zeros(shape), np.zeros(shape)
     residual[rows, cols] = model.residual * model.weight
     present[rows, cols] = 1.0
@@ -87,7 +85,7 @@ def covariance(
         score = score + np.diag(stiffness) * prior.noise
     inverse = np.linalg.pinv(information, hermitian=True)
     shift = (inverse[0, 0] + inverse[1, 1]) / 2 * reference.frame.radius**2
-    misfit = _MODEL_ERROR_PX**2 * (1 + model.state.blur) / shift * inverse
+    misfit = _MODEL_ERROR_PX**2 * (1 + max(model.state.blur, 0.0)) / shift * inverse
     return np.asarray((inverse @ score @ inverse + misfit)[:-1, :-1])
 
 

@@ -53,7 +53,7 @@ def judged(reference: Reference, found: Found, coarse: Pixels, shapes: Shapes) -
     thin = slice(None, None, max(len(figure) // 500, 1))
     at_corners = _stderr(matrix, corners, frame, spread)
     at_target = float(np.sqrt(np.mean(_stderr(matrix, figure[thin], frame, spread) ** 2)))
-    share = fitted.explained(found.pixels.value)
+    share = fitted.explained()
     signal = share / max(1 - share, 1e-12) * fitted.cost(fitted.weight)
     contrast = float(np.sqrt(signal / max(found.left.noise, 1e-300)))
     quality = likeness(reference, coarse, fitted.state)
