@@ -23,6 +23,12 @@ BACKGROUND = 6
 PLAIN = 11
 FULL = 23
 
+_SPREADS = np.array([*[0.5] * 2, 1.0, 0.7, *[np.inf] * 4, *[0.3] * 3, 0.5, 0.7, *[0.3] * 2, 0.5])
+"""How strong terms 7 to 22 may be beside the figure: standard deviations in units of its contrast.
+
+Light that falls off by half across the target, a halo of the figure's own strength, a tone curve
+between square root and square. The background is left free, whatever its strength."""
+
 
 class Fields(NamedTuple):
     """The fields at the pixels: value, slope in x, slope in y, Laplacian, each (4, n)."""
@@ -46,6 +52,20 @@ def terms(fields: Fields, count: int) -> Vector:
         out += [figure * out[3], figure * out[4], figure * out[5], figure * square]
         out += [figure * halo, halo * u, halo * v, veil]
     return np.stack(out)
+
+
+def ridge(linear: Vector, amplitudes: Vector, noise: float) -> Vector:
+    """Return what the square of each amplitude costs where independent pixels have variance ``noise``.
+
+    Shrinks towards the simplest appearance where the frame says nothing of the others.
+    """
+    figure = amplitudes[BACKGROUND:]
+    # Cubic background terms stand between those of the figure.
+    figure = np.where(np.isin(np.arange(figure.size), (5, 6, 7, 8)), 0.0, figure)
+    contrast = float(np.std(figure @ linear[BACKGROUND:])) / max(float(np.std(linear[BACKGROUND])), 1e-300)
+    out = np.zeros(amplitudes.size)
+    out[BACKGROUND + 1 :] = noise / (_SPREADS * max(contrast, 1e-300)) ** 2
+    return out
 
 
 def slopes(fields: Fields, amplitudes: Vector) -> tuple[Vector, Vector, Vector]:

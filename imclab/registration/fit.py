@@ -60,6 +60,8 @@ class Linearised:
     amplitudes : float64 array (terms,)
     value, residual, weight : float64 arrays (n,)
         What was measured, what the model leaves of it, and how much each pixel counts.
+    ridge : float64 array (terms,)
+        What the square of each amplitude costs.
 
     All are whitened where the fit was given a noise.
     """
@@ -71,6 +73,7 @@ class Linearised:
     value: Vector
     residual: Vector
     weight: Vector
+    ridge: Vector
 
     def cost(self, weight: Vector) -> float:
         """Weighted sum of squares of the residual."""
@@ -80,10 +83,17 @@ class Linearised:
         """Weighted mean square of the residual."""
         return self.cost(self.weight) / self.weight.size
 
-    def projected_slopes(self) -> Vector:
-        """Return the slopes without what the amplitudes could explain."""
-        coupling = _least_squares(self.linear, self.weight, self.slopes.T)
-        return self.slopes - coupling.T @ self.linear
+    def penalty(self) -> float:
+        """What the amplitudes cost."""
+        return float(self.ridge @ self.amplitudes**2)
+
+    def projected_slopes(self) -> tuple[Vector, Vector]:
+        """Return the slopes without what the amplitudes could explain, and the information that leaves.
+
+        The information counts the ridge as well: amplitudes that may not move freely explain less.
+        """
+        coupling = _least_squares(self.linear, self.weight, self.slopes.T, self.ridge)
+        return self.slopes - coupling.T @ self.linear, coupling.T @ (self.ridge[:, None] * coupling)
 
     def explained(self) -> float:
         """Share of the frame's structure, beyond the background, that the figure explains."""
@@ -98,6 +108,7 @@ class Task(NamedTuple):
     parameters: int
     term_count: int
     noise: Noise | None
+    ridge: Vector
 
     def linearised(self, state: State, weight: Vector) -> Linearised:
         """Return the model at a state, its amplitudes solved for under the weights."""
@@ -105,13 +116,14 @@ class Task(NamedTuple):
         fields = _fields(self.reference, self.pixels, state.blur, x, y)
         linear = self._whitened(terms(fields, self.term_count))
         value = self._whitened(self.pixels.value[None])[0]
-        amplitudes = _least_squares(linear, weight, value)
+        amplitudes = _least_squares(linear, weight, value, self.ridge)
         by_x, by_y, by_blur = slopes(fields, amplitudes)
         frame = self.reference.frame
         speeds = velocities((x - frame.x) / frame.radius, (y - frame.y) / frame.radius, self.parameters)
         by_motion = [-frame.radius * (by_x * p + by_y * q) for p, q in speeds]
         by_all = self._whitened(np.stack([*by_motion, by_blur]))
-        return Linearised(state, linear, by_all, amplitudes, value, value - amplitudes @ linear, weight)
+        residual = value - amplitudes @ linear
+        return Linearised(state, linear, by_all, amplitudes, value, residual, weight, self.ridge)
 
     def _whitened(self, fields: Vector) -> Vector:
         return fields if self.noise is None else self.noise.whitened(fields)
@@ -151,9 +163,12 @@ def fit(
     term_count: int = FULL,
     prior: Prior | None = None,
     noise: Noise | None = None,
+    ridge: Vector | None = None,
 ) -> Linearised:
     """Fit motion and blur from a start; return the model at the best state found."""
-    task = Task(reference, pixels, parameters, term_count, noise)
+    task = Task(
+        reference, pixels, parameters, term_count, noise, np.zeros(term_count) if ridge is None else ridge
+    )
     best = _reweighted(task.linearised(start, np.ones_like(pixels.value)))
     damping = 1e-3
     largest = (_LARGEST_BLUR * reference.frame.radius) ** 2
@@ -180,7 +195,7 @@ def fit(
 
 def _objective(model: Linearised, weight: Vector, reference: Reference, prior: Prior | None) -> float:
     penalty = 0.0 if prior is None else prior.penalty(model.state.matrix, reference.frame)
-    return model.cost(weight) + penalty
+    return model.cost(weight) + model.penalty() + penalty
 
 
 def _near(blur: float) -> tuple[float, float]:
@@ -198,12 +213,12 @@ def _fields(reference: Reference, pixels: Pixels, blur: float, x: Vector, y: Vec
     return Fields(sampled[0], sampled[1], sampled[2], u, v)
 
 
-def _least_squares(linear: Vector, weight: Vector, target: Vector) -> Vector:
-    """Solve for amplitudes; a ridge of 1e-9 keeps terms apart that a two-valued picture makes equal."""
+def _least_squares(linear: Vector, weight: Vector, target: Vector, ridge: Vector | None = None) -> Vector:
+    """Solve for amplitudes; 1e-9 more keeps terms apart that a two-valued picture makes equal."""
     weighted = linear * weight
     gram = weighted @ linear.T
     gram[np.diag_indices_from(gram)] *= 1 + 1e-9
-    gram[np.diag_indices_from(gram)] += 1e-300
+    gram[np.diag_indices_from(gram)] += 1e-300 if ridge is None else ridge + 1e-300
     return np.asarray(np.linalg.solve(gram, weighted @ target))
 
 
@@ -221,9 +236,9 @@ def _reweighted(model: Linearised) -> Linearised:
 
 
 def _step(model: Linearised, damping: float, reference: Reference, prior: Prior | None) -> Vector:
-    projected = model.projected_slopes()
-    weighted = projected * model.weight
-    information, right = weighted @ projected.T, weighted @ model.residual
+    projected, information = model.projected_slopes()
+    information = information + (projected * model.weight) @ projected.T
+    right = (model.slopes * model.weight) @ model.residual
     if prior is not None:
         pull, stiffness = prior.pull(model.state.matrix, reference.frame, len(right))
         information, right = information + np.diag(stiffness), right + pull

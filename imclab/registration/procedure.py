@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from imclab.errors import Fault, InputError
-from imclab.registration.appearance import PLAIN
+from imclab.registration.appearance import PLAIN, ridge
 from imclab.registration.coarse import candidates
 from imclab.registration.fit import Linearised, Pixels, State, choose_pixels, fit
 from imclab.registration.motion import PARAMETERS, Matrix, Prior, magnification, simplified
@@ -177,6 +177,7 @@ def _whitened_fit(reference: Reference, found: Found, steps: int) -> Linearised:
         steps=steps,
         prior=found.prior._replace(noise=1.0),
         noise=noise,
+        ridge=ridge(model.linear, model.amplitudes, 1.0),
     )
 
 

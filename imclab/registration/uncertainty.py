@@ -75,10 +75,10 @@ def covariance(
     model: Linearised, left: Leftover, *, reference: Reference, prior: Prior | None
 ) -> NDArray[np.float64]:
     """Covariance of the motion's parameters (in target units), blur and amplitudes projected out."""
-    projected = model.projected_slopes()
+    projected, restrained = model.projected_slopes()
     # Huber's score bends where a residual is cut: its slope there is 0, not the weight.
-    information = (projected * (model.weight == 1.0)) @ projected.T
-    score = _score_variance(projected * left.strength, left)
+    information = (projected * (model.weight == 1.0)) @ projected.T + restrained
+    score = _score_variance(projected * left.strength, left) + restrained * left.noise
     if prior is not None:
         _, stiffness = prior.pull(model.state.matrix, reference.frame, len(information))
         information = information + np.diag(stiffness)
