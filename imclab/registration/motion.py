@@ -34,7 +34,7 @@ PARAMETERS = {"translation": 2, "euclidean": 3, "similarity": 4, "affine": 6, "h
 """Motions from the simplest to the freest; each takes the first so many generators."""
 
 
-_STRETCH = 0.12
+_STRETCH = 0.06
 
 
 class Frame(NamedTuple):

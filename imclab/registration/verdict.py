@@ -19,10 +19,10 @@ from imclab.registration.reference import Reference
 from imclab.registration.result import Registration
 from imclab.registration.uncertainty import Leftover, covariance
 
-_LEAST_QUALITY = 0.5
-"""Frames with the target gave 0.84 and more, frames with another one 0.38 and less."""
+_LEAST_QUALITY = 0.8
+"""Frames with the target gave 0.85 and more, frames with another one 0.77 and less."""
 _LEAST_CONTRAST = 30.0
-"""Frames with the target at 0 dB gave 73 and more, noise and speckle 28 and less."""
+"""Frames with the target at 0 dB gave 42 and more, noise and speckle 19 and less."""
 _LARGEST_STDERR = 0.03
 """At the target, of its radius: with the target 0.01 and less."""
 _LARGEST_BLUR = 0.2
