@@ -54,8 +54,8 @@ def terms(fields: Fields, count: int) -> Vector:
     return np.stack(out)
 
 
-def ridge(linear: Vector, amplitudes: Vector, noise: float) -> Vector:
-    """Return what the square of each amplitude costs where independent pixels have variance ``noise``.
+def ridge(linear: Vector, amplitudes: Vector, noise: float, count: int = FULL) -> Vector:
+    """Return what the square of each of ``count`` amplitudes costs where independent pixels have variance ``noise``.
 
     Shrinks towards the simplest appearance where the frame says nothing of the others.
     """
@@ -63,9 +63,9 @@ def ridge(linear: Vector, amplitudes: Vector, noise: float) -> Vector:
     # Cubic background terms stand between those of the figure.
     figure = np.where(np.isin(np.arange(figure.size), (5, 6, 7, 8)), 0.0, figure)
     contrast = float(np.std(figure @ linear[BACKGROUND:])) / max(float(np.std(linear[BACKGROUND])), 1e-300)
-    out = np.zeros(amplitudes.size)
+    out = np.zeros(FULL)
     out[BACKGROUND + 1 :] = noise / (_SPREADS * max(contrast, 1e-300)) ** 2
-    return out
+    return out[:count]
 
 
 def slopes(fields: Fields, amplitudes: Vector) -> tuple[Vector, Vector, Vector]:

@@ -171,7 +171,12 @@ def parameters_between(matrix: Matrix, other: Matrix, frame: Frame) -> NDArray[n
 
 
 def simplified(matrix: Matrix, model: str, frame: Frame) -> Matrix:
-    """Return the translation, rotation or similarity that agrees with a motion at the target."""
+    """Return the translation, rotation or similarity that agrees with a motion at the target.
+
+    A freer model keeps the motion as it is.
+    """
+    if PARAMETERS[model] > PARAMETERS["similarity"]:
+        return matrix
     centre = np.array([[frame.x, frame.y]])
     local = jacobian(matrix, centre)[0]
     turn = np.arctan2(local[1, 0] - local[0, 1], local[0, 0] + local[1, 1]) if model != "translation" else 0.0

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from imclab.errors import Fault, InputError
-from imclab.registration.appearance import PLAIN, ridge
+from imclab.registration.appearance import FULL, PLAIN, ridge
 from imclab.registration.coarse import candidates
 from imclab.registration.fit import Linearised, Pixels, State, choose_pixels, fit
 from imclab.registration.motion import PARAMETERS, Matrix, Prior, magnification, simplified
@@ -63,7 +63,7 @@ def register(fixed: ArrayLike, moving: ArrayLike, model: str = "similarity") -> 
     if usable.mean() < 0.5 or np.ptp(frame[usable]) == 0:
         return nothing("the frame is blank: no usable pixel differs from another", wanted, shapes)
     clean = cv2.medianBlur(frame.astype(np.float32), 3).astype(np.float64)
-    start = _best_start(reference, clean)
+    start = _best_start(reference, clean, "homography" if model == "auto" else model)
     if start is None:
         return nothing("the target was not found in the frame", wanted, shapes)
     pyramid = _Pyramid(frame, clean, usable)
@@ -124,74 +124,94 @@ def _coarse_pixels(reference: Reference, clean: NDArray[np.float64], matrix: Mat
     return choose_pixels(_binned(clean, width), reference, matrix)
 
 
-def _best_start(reference: Reference, clean: NDArray[np.float64]) -> State | None:
-    """Refine the coarse candidates as similarities on binned pixels; return what explains most."""
+def _best_start(reference: Reference, clean: NDArray[np.float64], model: str) -> State | None:
+    """Refine the coarse candidates on binned pixels; return what explains most.
+
+    A similarity first. Where the motion may be freer, an affine one follows with the plain
+    appearance: what a similarity leaves of a sheared figure the full appearance would imitate.
+    """
     best, best_share = None, 0.0
     for candidate in candidates(reference, clean, count=_CANDIDATES):
         pixels = _coarse_pixels(reference, clean, candidate.matrix)
         if pixels.x.size < _FEWEST_PIXELS:
             continue
-        start = State(candidate.matrix, 9.0)
-        model = fit(reference, pixels, start, parameters=PARAMETERS["similarity"], steps=8, term_count=PLAIN)
-        share = model.explained()
+        how = {"steps": 8, "term_count": PLAIN}
+        fitted = fit(reference, pixels, State(candidate.matrix, 9.0), parameters=4, **how)
+        if PARAMETERS[model] > PARAMETERS["similarity"]:
+            prior = Prior(leftover(fitted, pixels).noise, reference.perspective)
+            fitted = fit(reference, pixels, fitted.state, parameters=6, prior=prior, **how)
+        share = fitted.explained()
         if share > best_share:
-            best, best_share = model.state, share
+            best, best_share = fitted.state, share
     return best
 
 
 def _refined(reference: Reference, pyramid: _Pyramid, start: State, model: str) -> Found | None:
-    """Fit on half-size pixels, then on the raw ones, with the prior scaled by the noise found."""
+    """Fit on half-size pixels, on the raw ones, and on these with their noise made white."""
+    first = _unweighted(reference, pyramid, start, model)
+    return None if first is None else _whitened(reference, first, model)
+
+
+def _unweighted(reference: Reference, pyramid: _Pyramid, start: State, model: str) -> Found | None:
+    """Fit with equal weights, the appearance plain and then full; prior and ridge follow the noise."""
     state = State(simplified(start.matrix, model, reference.frame), min(start.blur, 4.0))
-    count = PARAMETERS[model]
     radius = reference.frame.radius * magnification(state.matrix)
     finest = int(max(np.ceil(np.sqrt((2.5 * radius) ** 2 / _MOST_PIXELS)), 1))
-    prior, found = None, None
-    for width, steps in ((2 * finest, 10), (finest, 4), (finest, 8)):
+    found: Found | None = None
+    for width, steps, terms in ((2 * finest, 8, PLAIN), (2 * finest, 8, FULL), (finest, 4, FULL)):
         pixels = choose_pixels(pyramid.pixels(width), reference, state.matrix)
         if pixels.x.size < _FEWEST_PIXELS:
             continue
-        if found is not None and found.pixels.width == width:
-            fitted = _whitened_fit(reference, found, steps)
-            pixels = found.pixels
-        else:
-            fitted = fit(reference, pixels, state, parameters=count, steps=steps, prior=prior)
+        fitted = fit(
+            reference,
+            pixels,
+            state,
+            parameters=PARAMETERS[model],
+            steps=steps,
+            term_count=terms,
+            prior=None if found is None else found.prior,
+            noise=None,
+            ridge=None if found is None else found.ridge(terms),
+        )
         state = fitted.state
-        left = leftover(fitted, pixels)
-        prior = Prior(left.noise, reference.perspective)
-        found = Found(fitted, pixels, left, prior, model)
+        found = _found(reference, fitted, pixels, model)
     return found
 
 
-def _whitened_fit(reference: Reference, found: Found, steps: int) -> Linearised:
-    """Fit once more with the noise that the last fit left over; outliers are cut first."""
-    model, pixels = found.model, found.pixels
-    brightness = pixels.value - model.residual
-    spread = _OUTLIER * 1.4826 * float(np.median(np.abs(model.residual)))
-    kept = np.clip(model.residual, -spread, spread)
-    noise = noise_of(kept, brightness, grid_of(pixels.x, pixels.y, pixels.width))
-    return fit(
+def _whitened(reference: Reference, first: Found, model: str) -> Found:
+    """Fit a motion once more with the noise that a first fit left over; outliers are cut before."""
+    fitted, pixels = first.model, first.pixels
+    brightness = pixels.value - fitted.residual
+    most = _OUTLIER * 1.4826 * float(np.median(np.abs(fitted.residual)))
+    kept = np.clip(fitted.residual, -most, most)
+    again = fit(
         reference,
         pixels._replace(value=brightness + kept),
-        model.state,
-        parameters=PARAMETERS[found.name],
-        steps=steps,
-        prior=found.prior._replace(noise=1.0),
-        noise=noise,
-        ridge=ridge(model.linear, model.amplitudes, 1.0),
+        State(simplified(fitted.state.matrix, model, reference.frame), fitted.state.blur),
+        parameters=PARAMETERS[model],
+        steps=8,
+        prior=first.prior._replace(noise=1.0),
+        noise=noise_of(kept, brightness, grid_of(pixels.x, pixels.y, pixels.width)),
+        ridge=ridge(fitted.linear, fitted.amplitudes, 1.0),
     )
+    return _found(reference, again, pixels, model)
+
+
+def _found(reference: Reference, model: Linearised, pixels: Pixels, name: str) -> Found:
+    left = leftover(model, pixels)
+    return Found(model, pixels, left, Prior(left.noise, reference.perspective), name)
 
 
 def _simplest(reference: Reference, pyramid: _Pyramid, start: State) -> str:
-    """Choose the motion by Schwarz's criterion, with the noise of independent pixels."""
-    results = {model: _refined(reference, pyramid, start, model) for model in PARAMETERS}
-    freest = results["homography"]
-    if freest is None:
+    """Choose the motion by Schwarz's criterion, all measured with the noise the freest one left."""
+    first = _unweighted(reference, pyramid, start, "homography")
+    if first is None:
         return "similarity"
-    noise = freest.left.noise
+    results = {model: _whitened(reference, first, model) for model in PARAMETERS}
+    pixels = first.pixels.x.size
     scores = {
-        model: freest.pixels.x.size * found.model.mean_cost() / noise
-        + np.log(freest.pixels.x.size) * PARAMETERS[model]
+        model: pixels * found.model.mean_cost() / results["homography"].left.noise
+        + np.log(pixels) * PARAMETERS[model]
         for model, found in results.items()
-        if found is not None
     }
     return min(scores, key=lambda model: scores[model])

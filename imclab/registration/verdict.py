@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from imclab.registration.appearance import ridge
 from imclab.registration.fit import Linearised, Pixels, likeness
 from imclab.registration.motion import PARAMETERS, Frame, Matrix, Prior, displacements, magnification
 from imclab.registration.reference import Reference
@@ -37,6 +38,10 @@ class Found(NamedTuple):
     left: Leftover
     prior: Prior
     name: str
+
+    def ridge(self, count: int) -> NDArray[np.float64]:
+        """Return what ``count`` amplitudes of a further fit cost beside those found here."""
+        return ridge(self.model.linear, self.model.amplitudes, self.left.noise, count)
 
 
 Shapes = tuple[tuple[int, ...], tuple[int, ...]]
