@@ -23,6 +23,7 @@ Vector = NDArray[np.float64]
 
 _HUBER = 3.0
 """Residuals beyond so many standard deviations count linearly."""
+_MOST_EXCUSED = 0.1
 _CONVERGED_PX = 2e-3
 _LONGEST_STEP_PX = 3.0
 _SHARPEST = -0.8
@@ -139,18 +140,23 @@ def choose_pixels(frame: Pixels, reference: Reference, matrix: Matrix) -> Pixels
     return Pixels(frame.x[near], frame.y[near], frame.value[near], frame.width)
 
 
-def likeness(reference: Reference, pixels: Pixels, state: State) -> float:
-    """Share of the frame's structure beyond the background that the picture itself explains.
+def likeness(reference: Reference, pixels: Pixels, state: State, noise: float) -> float:
+    """Share of the frame's structure, beyond background and noise, that the picture itself explains.
 
     One amplitude: no halo, no tone, no illumination, which could imitate other structure. Negative
-    when the frame shows the reverse of the picture.
+    when the frame shows the reverse of the picture. ``noise`` is the variance of a pixel; no more
+    than a tenth of the structure is put down to it, or a wrong picture would be excused by noise.
     """
     x, y = moved_back(state.matrix, pixels.x, pixels.y)
     fields = _fields(reference, pixels, state.blur + pixels.width**2 / 12, x, y)
     linear = terms(fields, PLAIN)[: BACKGROUND + 1]
     weight = np.ones_like(pixels.value)
     sign = np.sign(_least_squares(linear, weight, pixels.value)[-1])
-    return float(sign * _explained(linear, weight, pixels.value))
+    left = 1 - _explained(linear, weight, pixels.value)
+    background = linear[:BACKGROUND]
+    rest = pixels.value - _least_squares(background, weight, pixels.value) @ background
+    excused = min(noise / max(float(np.mean(rest * rest)), 1e-300), _MOST_EXCUSED, left)
+    return float(sign * (1 - left) / (1 - excused))
 
 
 def fit(

@@ -71,7 +71,9 @@ def register(fixed: ArrayLike, moving: ArrayLike, model: str = "similarity") -> 
     found = _refined(reference, pyramid, start, chosen)
     if found is None:
         return nothing("too little of the target lies inside the frame", chosen, shapes)
-    return judged(reference, found, _coarse_pixels(reference, clean, found.model.state.matrix), shapes)
+    matrix = found.model.state.matrix
+    noise = _coarse_noise(clean, _coarse_width(reference, matrix))
+    return judged(reference, found, _coarse_pixels(reference, clean, matrix), noise, shapes)
 
 
 class _Pyramid(NamedTuple):
@@ -120,8 +122,25 @@ def _binned(picture: NDArray[np.float64], width: int) -> Pixels:
 
 def _coarse_pixels(reference: Reference, clean: NDArray[np.float64], matrix: Matrix) -> Pixels:
     """Bin the frame until the target is small, and keep its surroundings."""
-    width = int(max(reference.frame.radius * magnification(matrix) / _COARSE_RADIUS, 1))
-    return choose_pixels(_binned(clean, width), reference, matrix)
+    return choose_pixels(_binned(clean, _coarse_width(reference, matrix)), reference, matrix)
+
+
+def _coarse_width(reference: Reference, matrix: Matrix) -> int:
+    return int(max(reference.frame.radius * magnification(matrix) / _COARSE_RADIUS, 1))
+
+
+def _coarse_noise(clean: NDArray[np.float64], width: int) -> float:
+    """Variance of the noise of binned pixels, from second differences over all of the frame.
+
+    Their median passes over the few that a target's edges make large.
+    """
+    rows, cols = (size // width for size in clean.shape)
+    value = _binned(clean, width).value.reshape(rows, cols)
+    middle = [
+        float(np.median(np.abs(np.diff(value, 2, axis=axis)))) if value.shape[axis] > 2 else np.inf
+        for axis in (0, 1)
+    ]
+    return (1.4826 * min(middle)) ** 2 / 6 if np.isfinite(min(middle)) else 0.0
 
 
 def _best_start(reference: Reference, clean: NDArray[np.float64], model: str) -> State | None:

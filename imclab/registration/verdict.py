@@ -20,8 +20,8 @@ from imclab.registration.reference import Reference
 from imclab.registration.result import Registration
 from imclab.registration.uncertainty import Leftover, covariance
 
-_LEAST_QUALITY = 0.8
-"""Frames with the target gave 0.85 and more, frames with another one 0.77 and less."""
+_LEAST_QUALITY = 0.84
+"""Frames with the target gave 0.87 and more, 450 frames with another one 0.83 and less."""
 _LEAST_CONTRAST = 30.0
 """Frames with the target at 0 dB gave 42 and more, noise and speckle 19 and less."""
 _LARGEST_STDERR = 0.03
@@ -47,8 +47,10 @@ class Found(NamedTuple):
 Shapes = tuple[tuple[int, ...], tuple[int, ...]]
 
 
-def judged(reference: Reference, found: Found, coarse: Pixels, shapes: Shapes) -> Registration:
-    """Return the result of a fit; ``coarse`` are binned pixels, on which noise matters little."""
+def judged(
+    reference: Reference, found: Found, coarse: Pixels, noise: float, shapes: Shapes
+) -> Registration:
+    """Return the result of a fit; ``coarse`` are binned pixels and ``noise`` the variance of one."""
     fitted, frame = found.model, reference.frame
     matrix = fitted.state.matrix
     spread = covariance(fitted, found.left, reference=reference, prior=found.prior)
@@ -61,7 +63,7 @@ def judged(reference: Reference, found: Found, coarse: Pixels, shapes: Shapes) -
     share = fitted.explained()
     signal = share / max(1 - share, 1e-12) * fitted.cost(fitted.weight)
     contrast = float(np.sqrt(signal / max(found.left.noise, 1e-300)))
-    quality = likeness(reference, coarse, fitted.state)
+    quality = likeness(reference, coarse, fitted.state, noise)
     blur = float(np.sqrt(max(fitted.state.blur, 0.0)))
     relative = at_target / (frame.radius * magnification(matrix))
     reason = _doubt(quality, contrast, relative, blur / frame.radius)
