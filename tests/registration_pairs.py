@@ -8,12 +8,15 @@ blur, halo, beam, background, tone and noise are laid on in that order.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 FINE = 8
+SPECKLE_PX = 0.8
+SPECKLE_SHARE = (0.2, 0.7)
 BANDS = ("small", "medium", "large", "affine", "homography")
 SNR_DB = (40.0, 20.0, 10.0, 5.0, 0.0)
 TARGETS = ("diver", "slit", "bars", "polygons")
@@ -77,18 +80,41 @@ def make_pair(
     frame_shape: tuple[int, int] | None = None,
 ) -> Pair:
     """Draw one pair; ``dark`` puts a dark figure on a bright ground."""
+    scene = make_scene(seed, band=band, snr_db=snr_db, target=target, dark=dark, frame_shape=frame_shape)
+    light = through(scene.albedo, scene.matrix, scene.shape)
+    moving = _measured(scene.rng, light, snr_db)
+    return Pair(scene.fixed, moving, scene.matrix, scene.lit, target, band, snr_db)
+
+
+class Scene(NamedTuple):
+    """A drawn target and the motion, before light and noise are laid on."""
+
+    albedo: NDArray[np.float32]
+    fixed: NDArray[np.float64]
+    lit: NDArray[np.bool_]
+    matrix: NDArray[np.float64]
+    shape: tuple[int, int]
+    rng: np.random.Generator
+
+
+def make_scene(
+    seed: int,
+    *,
+    band: str,
+    snr_db: float,
+    target: str,
+    dark: bool,
+    frame_shape: tuple[int, int] | None = None,
+) -> Scene:
+    """Draw what :func:`make_pair` then photographs."""
     rng = np.random.default_rng([seed, BANDS.index(band), int(snr_db), TARGETS.index(target)])
     fine = draw_figure(rng, target)
-    lit = _binned(fine) > 0.5
     albedo = 1.0 - 0.85 * fine if dark else 0.05 + 0.95 * fine
     clean = _binned(_blur(albedo, rng.uniform(0.6, 1.3) * FINE)).astype(np.float64)
     contrast = float(np.abs(clean - np.median(clean)).max())
     fixed = clean + rng.normal(0, 0.01 * contrast, clean.shape) * np.sqrt(np.maximum(clean, 0.05))
     shape = frame_shape or ((200, 200) if rng.random() < 0.5 else (256, 320))
-    matrix = _motion(rng, band, shape)
-    light = _through(albedo, matrix, shape)
-    moving = _measured(rng, light, snr_db)
-    return Pair(fixed, moving, matrix, lit, target, band, snr_db)
+    return Scene(albedo, fixed, _binned(fine) > 0.5, _motion(rng, band, shape), shape, rng)
 
 
 def target_free_frame(seed: int, shape: tuple[int, int] = (256, 320)) -> NDArray[np.generic]:
@@ -150,7 +176,7 @@ def _motion(rng: np.random.Generator, band: str, shape: tuple[int, int]) -> NDAr
     return np.asarray(total / total[2, 2])
 
 
-def _through(
+def through(
     albedo: NDArray[np.float32], matrix: NDArray[np.float64], shape: tuple[int, int]
 ) -> NDArray[np.float32]:
     """Integrate the fine raster over the pixels of the frame, through the motion."""
@@ -166,9 +192,13 @@ def _through(
     return _binned(np.asarray(warped, np.float32), over)
 
 
-def _measured(
-    rng: np.random.Generator, light: NDArray[np.float32], snr_db: float, noise: float | None = None
-) -> NDArray[np.generic]:
+def brightness(
+    rng: np.random.Generator, light: NDArray[np.float32], largest: float | None = None
+) -> tuple[NDArray[np.float64], float]:
+    """Lay on blur, halo, beam, background and tone; also return the largest value before the tone.
+
+    Given ``largest``, that is the value brightness is measured by, whatever the light.
+    """
     rows, cols = light.shape
     core, wide = rng.uniform(0.0, 3.0), rng.uniform(6, 14)
     share = rng.uniform(0.08, 0.43)
@@ -179,15 +209,33 @@ def _measured(
     beam = np.exp(-((u - beam_centre[0]) ** 2 + (v - beam_centre[1]) ** 2) / (2 * beam_width**2))
     veil = rng.uniform(0.1, 0.8) * beam + rng.uniform(0, 0.4) * u / cols + rng.uniform(-0.2, 0.2) * v / rows
     picture = np.asarray(seen * beam + np.maximum(veil, 0), np.float64)
-    picture = (picture / picture.max()) ** rng.uniform(0.5, 2.0)
+    largest = float(picture.max()) if largest is None else largest
+    return (picture / largest) ** rng.uniform(0.5, 2.0), largest
+
+
+def noise_strength(
+    picture: NDArray[np.float64], snr_db: float, noise: float | None = None
+) -> NDArray[np.float64]:
+    """Standard deviation of the noise at each pixel.
+
+    The signal of the ratio is the standard deviation of the whole frame without its wide background.
+    """
     signal = float((picture - _blur(picture.astype(np.float32), 40)).std())
     level = noise if noise is not None else signal / 10 ** (snr_db / 20)
+    return np.asarray(level * np.sqrt(0.25 + 0.75 * picture / picture.mean()))
+
+
+def _measured(
+    rng: np.random.Generator, light: NDArray[np.float32], snr_db: float, noise: float | None = None
+) -> NDArray[np.generic]:
+    rows, cols = light.shape
+    picture, _ = brightness(rng, light)
     grain = rng.normal(size=(rows, cols))
-    speckle = _blur(rng.normal(size=(rows, cols)).astype(np.float32), 0.8)
+    speckle = _blur(rng.normal(size=(rows, cols)).astype(np.float32), SPECKLE_PX)
     speckle = speckle / speckle.std()
-    strength = np.sqrt(0.25 + 0.75 * picture / picture.mean())
-    share_speckle = rng.uniform(0.2, 0.7)
-    picture += level * strength * (np.sqrt(1 - share_speckle) * grain + np.sqrt(share_speckle) * speckle)
+    share_speckle = rng.uniform(*SPECKLE_SHARE)
+    strength = noise_strength(picture, snr_db, noise)
+    picture = picture + strength * (np.sqrt(1 - share_speckle) * grain + np.sqrt(share_speckle) * speckle)
     bits, kind = (8, np.uint8) if rng.random() < 0.5 else (12, np.uint16)
     full = 2**bits - 1
     lowest, highest = np.quantile(picture, [0.0005, 0.9995])

@@ -55,9 +55,10 @@ def terms(fields: Fields, count: int) -> Vector:
 
 
 def ridge(linear: Vector, amplitudes: Vector, noise: float, count: int = FULL) -> Vector:
-    """Return what the square of each of ``count`` amplitudes costs where independent pixels have variance ``noise``.
+    """Return what the square of each of ``count`` amplitudes costs.
 
-    Shrinks towards the simplest appearance where the frame says nothing of the others.
+    ``noise`` is the variance of an independent pixel of a frame that ``linear`` and ``amplitudes``
+    were fitted to. Shrinks towards the simplest appearance where the frame says nothing of the others.
     """
     figure = amplitudes[BACKGROUND:]
     # Cubic background terms stand between those of the figure.

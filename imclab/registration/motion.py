@@ -119,7 +119,7 @@ def distortion(matrix: Matrix, frame: Frame) -> NDArray[np.float64]:
 class Prior(NamedTuple):
     """What a flat target in front of a long lens can do, against what noise would make of it.
 
-    A standard deviation of 0.12 for stretch and shear (a tilt by 35 degrees stretches by 0.1) and
+    A standard deviation of 0.06 for stretch and shear (a tilt by 28 degrees stretches by 0.06) and
     of ``perspective`` for the perspectives, times ``noise``, the variance of one independent pixel.
     """
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NamedTuple
 
 import cv2
@@ -154,11 +155,11 @@ def _best_start(reference: Reference, clean: NDArray[np.float64], model: str) ->
         pixels = _coarse_pixels(reference, clean, candidate.matrix)
         if pixels.x.size < _FEWEST_PIXELS:
             continue
-        how = {"steps": 8, "term_count": PLAIN}
-        fitted = fit(reference, pixels, State(candidate.matrix, 9.0), parameters=4, **how)
+        plain = partial(fit, reference, pixels, steps=8, term_count=PLAIN)
+        fitted = plain(State(candidate.matrix, 9.0), parameters=PARAMETERS["similarity"])
         if PARAMETERS[model] > PARAMETERS["similarity"]:
             prior = Prior(leftover(fitted, pixels).noise, reference.perspective)
-            fitted = fit(reference, pixels, fitted.state, parameters=6, prior=prior, **how)
+            fitted = plain(fitted.state, parameters=PARAMETERS["affine"], prior=prior)
         share = fitted.explained()
         if share > best_share:
             best, best_share = fitted.state, share
@@ -189,7 +190,6 @@ def _unweighted(reference: Reference, pyramid: _Pyramid, start: State, model: st
             steps=steps,
             term_count=terms,
             prior=None if found is None else found.prior,
-            noise=None,
             ridge=None if found is None else found.ridge(terms),
         )
         state = fitted.state

@@ -47,9 +47,7 @@ class Found(NamedTuple):
 Shapes = tuple[tuple[int, ...], tuple[int, ...]]
 
 
-def judged(
-    reference: Reference, found: Found, coarse: Pixels, noise: float, shapes: Shapes
-) -> Registration:
+def judged(reference: Reference, found: Found, coarse: Pixels, noise: float, shapes: Shapes) -> Registration:
     """Return the result of a fit; ``coarse`` are binned pixels and ``noise`` the variance of one."""
     fitted, frame = found.model, reference.frame
     matrix = fitted.state.matrix

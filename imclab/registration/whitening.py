@@ -50,16 +50,16 @@ class Noise(NamedTuple):
 
     def whitened(self, fields: Vector) -> Vector:
         """Return fields (k, n) in which the noise is white and of unit strength."""
-        scaled = fields / self.strength
-        if self.depth == 0:
-            return np.asarray(scaled)
+        scaled = np.asarray(fields / self.strength)
+        if self.depth > 0:
+            scaled -= self.depth * np.stack([self._smooth(values) for values in scaled])
+        return scaled
+
+    def _smooth(self, values: Vector) -> Vector:
         size = 2 * int(np.ceil(3 * self.width)) + 1
-        for values in scaled:
-            smooth = cv2.GaussianBlur(
-                self.grid.picture(values), (size, size), self.width, borderType=cv2.BORDER_CONSTANT
-            )
-            values -= self.depth * smooth[self.grid.rows, self.grid.cols]
-        return np.asarray(scaled)
+        field = self.grid.picture(values)
+        smooth = cv2.GaussianBlur(field, (size, size), self.width, borderType=cv2.BORDER_CONSTANT)
+        return np.asarray(smooth[self.grid.rows, self.grid.cols])
 
 
 def grid_of(x: Vector, y: Vector, width: int) -> Grid:

@@ -85,3 +85,17 @@ def test_the_spline_goes_through_the_pixels_and_knows_its_slopes():
     np.testing.assert_allclose(here[2], (low[0] - high[0]) / (2 * step), atol=1e-4)
     bend = (right[0] + left[0] + low[0] + high[0] - 4 * here[0]) / step**2
     np.testing.assert_allclose(here[3], bend, atol=2e-2)
+
+
+def test_a_small_negative_blur_sharpens():
+    y, x = np.mgrid[:40, :40].astype(float)
+    picture = np.exp(-((x - 20) ** 2 + (y - 18) ** 2) / (2 * 9.0)) * 9.0
+    blurred = np.exp(-((x - 20) ** 2 + (y - 18) ** 2) / (2 * 9.5)) * 9.0 * 9.0 / 9.5
+    values = []
+    for variance in (-0.5, 0.0):
+        out = np.empty((4, 26 * 26))
+        inner = (slice(7, 33), slice(7, 33))
+        sampling.sample(sampling.coefficients(blurred, variance), x[inner].ravel(), y[inner].ravel(), out)
+        values.append(np.abs(out[0] - picture[inner].ravel()).max())
+    assert values[0] < 0.04  # the second order left out: variance² / 8 · 8 · 9 / 3⁴ = 0.03
+    assert values[1] > 0.3  # power: without it the peak is too low
