@@ -87,14 +87,16 @@ def line(name: str, data: np.ndarray) -> None:
     print(" | ".join(parts), flush=True)
 
 
-def measure_free(count: int) -> None:
+def measure_free(count: int, first: int) -> None:
     accepted, total = {}, {}
-    for seed in range(count):
+    for seed in range(first, first + count):
         pair = make_pair(seed, band="small", target=TARGETS[seed % 4])
         for kind, frame in decoy_frames(seed).items():
             found = register(pair.fixed, frame, model=("similarity", "affine", "homography")[seed % 3])
             accepted[kind] = accepted.get(kind, 0) + found.ok
             total[kind] = total.get(kind, 0) + 1
+            if found.ok:
+                print(f"  accepted: {kind} {seed}, quality {found.quality:.2f}, contrast {found.contrast:.0f}")
     told = ", ".join(f"{kind} {accepted[kind]} of {total[kind]}" for kind in total)
     print("target-free frames accepted:", told, flush=True)
 
@@ -266,7 +268,7 @@ def main() -> None:
     if options.pairs:
         measure_ours(options.pairs, options.first)
     if options.free:
-        measure_free(options.free)
+        measure_free(options.free, options.first)
     if options.peers:
         measure_peers(options.peers, options.first)
     if options.shifts:
