@@ -96,7 +96,9 @@ def measure_free(count: int, first: int) -> None:
             accepted[kind] = accepted.get(kind, 0) + found.ok
             total[kind] = total.get(kind, 0) + 1
             if found.ok:
-                print(f"  accepted: {kind} {seed}, quality {found.quality:.2f}, contrast {found.contrast:.0f}")
+                print(
+                    f"  accepted: {kind} {seed}, quality {found.quality:.2f}, contrast {found.contrast:.0f}"
+                )
     told = ", ".join(f"{kind} {accepted[kind]} of {total[kind]}" for kind in total)
     print("target-free frames accepted:", told, flush=True)
 

@@ -90,7 +90,7 @@ def bounds(label: Pair, scene: Scene) -> dict[str, np.ndarray]:
     unknown = known - (known @ basis) @ basis.T
     prior = np.diag([1 / sd**2 if sd > 0 else 0.0 for sd in PRIOR[:count]])
     slope = displacements(scene.matrix, CORNERS, FRAME, count)
-    rng = np.random.default_rng(0)
+    rng = copy.deepcopy(scene.rng)
     out = {}
     for name, used, extra in (
         ("appearance unknown", unknown, 0 * prior),
