@@ -38,3 +38,9 @@ def curves_of(study: Study, records: Sequence[Result | Flux]) -> dict[str, list[
         value = "" if study.vary is None else str(unit.changes[study.vary.key])
         curves.setdefault(unit.changes["curve"], []).append(Point(unit.scene, value, record))
     return curves
+
+
+def shown_value(study: Study, point: Point) -> str:
+    """Return the varied value as people write it: an optical depth is a number, not an attenuation."""
+    depth = study.vary is not None and study.vary.label == "optical depth"
+    return f"{point.optical_depth:.2f}" if depth else point.value

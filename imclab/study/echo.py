@@ -133,6 +133,7 @@ def _figure(curves: Curves) -> Figure:
         )
         below.set_title(f"optical depth {gated.optical_depth:.2f}, gated")
         for axes in (above, below):
-            axes.set(xlabel="time (ns)", ylabel="power over the peak above", xlim=(0, end))
+            axes.set(xlim=(0, end), ylabel="power over the peak")
             axes.legend(fontsize="small")
+        below.set_xlabel("time since the pulse's peak entered the water (ns)")
     return figure

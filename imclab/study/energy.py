@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 Curves = dict[str, list[Point]]
 SIGMAS = 3.0
 """Two numbers differ when they are so many standard errors apart."""
+_TICKS = (0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.7, 1.0)
 
 
 def conclude(study: Study, records: Sequence[Result | Flux]) -> Conclusion:
@@ -114,24 +115,32 @@ def _pair(one: str, other: str) -> bool:
 
 
 def _figure(curves: Curves) -> Figure:
+    """One panel a target, as in the paper."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(6.5, 4.5), layout="constrained")
-    axes = figure.add_subplot()
-    for name, points in curves.items():
-        values = [_normalised(points, index) for index in range(len(points))]
-        axes.errorbar(
-            [point.optical_depth for point in points],
-            [value.value for value in values],
-            [value.stderr for value in values],
-            marker="o",
-            markersize=4,
-            linestyle="--" if _aside(points) else "-",
-            label=name,
-        )
-    points = next(iter(curves.values()))
-    depths = [point.optical_depth for point in points]
-    axes.plot(depths, [math.exp(-2 * (d - depths[0])) for d in depths], ":k", label="unscattered, two ways")
-    axes.set(xlabel="optical depth", ylabel="energy over that at the first depth", yscale="log")
-    axes.legend(fontsize="small")
+    targets = list(dict.fromkeys(name.rpartition(", ")[0] for name in curves))
+    figure = Figure(figsize=(4.8 * len(targets), 4.2), layout="constrained")
+    panels = figure.subplots(1, len(targets), sharey=True, squeeze=False)[0]
+    for axes, target in zip(panels, targets, strict=True):
+        alike = {name: points for name, points in curves.items() if name.startswith(f"{target}, ")}
+        for name, points in alike.items():
+            values = [_normalised(points, index) for index in range(len(points))]
+            axes.errorbar(
+                [point.optical_depth for point in points],
+                [value.value for value in values],
+                [value.stderr for value in values],
+                marker="s" if _aside(points) else "o",
+                markersize=4,
+                capsize=2,
+                linestyle="--" if _aside(points) else "-",
+                label=name.rpartition(", ")[2],
+            )
+        depths = [point.optical_depth for point in next(iter(alike.values()))]
+        unscattered = [math.exp(-2 * (depth - depths[0])) for depth in depths]
+        axes.plot(depths, unscattered, ":k", label="unscattered, two ways")
+        axes.set(title=target, xlabel="optical depth", yscale="log")
+        axes.set_yticks(_TICKS, [f"{tick:g}" for tick in _TICKS])
+        axes.set_yticks([], minor=True)
+        axes.legend(fontsize="small", title="bars: one standard error", title_fontsize="small")
+    panels[0].set_ylabel(f"energy over that at optical depth {depths[0]:g}")
     return figure

@@ -13,7 +13,9 @@ from imclab.errors import InputError
 from imclab.result import Flux, Result
 from imclab.study import broadening, echo, energy, load_study, pictures
 from imclab.study.conclusion import Conclusion
+from imclab.study.curves import Point
 from imclab.study.file import Study, studies_in
+from imclab.study.picture_statements import figure_pixels
 from imclab.study.ratios import difference, ratio, shown
 from imclab.uncertainty import Estimate
 
@@ -107,12 +109,33 @@ def test_finding_on_the_radius(spot_matters: bool) -> None:
     assert len(conclusion.rows) == len(study.units) * len(study.distances)
 
 
-@pytest.mark.parametrize(("spread", "hardly"), [(0.0, True), (0.2, True), (1.0, False)])
-def test_finding_on_the_pulse(spread: float, hardly: bool) -> None:
+@pytest.mark.parametrize(
+    ("spread", "less", "unseen"), [(0.0, True, True), (0.2, True, False), (20.0, False, False)]
+)
+def test_findings_on_the_pulse(spread: float, less: bool, unseen: bool) -> None:
     study = load_study(STUDIES / "fig2_broadening.toml")
     units = range(len(study.units))
-    records = [flux(study, i, spot_matters=False, pulse_spread=spread) for i in units]
-    assert verdicts(broadening.conclude(study, records), "Temporal broadening") == [hardly]
+    conclusion = broadening.conclude(
+        study, [flux(study, i, spot_matters=False, pulse_spread=spread) for i in units]
+    )
+    assert verdicts(conclusion, "Divergence and initial radius affect the pulse's width less") == [less]
+    assert verdicts(conclusion, "Their effect on the pulse's width is too small") == [unseen]
+
+
+@pytest.mark.parametrize(("at_end", "alike"), [(1.005, True), (1.5, True), (4.0, False)])
+def test_finding_on_the_divergence(at_end: float, alike: bool) -> None:
+    """Narrow beams become alike when they end nearer than they began, or within a line's width."""
+    study = load_study(STUDIES / "fig2_broadening.toml")
+    records = []
+    for unit in study.units:
+        start = unit.scene.laser.divergence_fwhm / 0.02
+        end = {1.0: 1.0, 3.0: at_end, 5.0: 2.0, 10.0: 5.0}[round(start, 3)]
+        far = np.linspace(0.0, 1.0, len(study.distances))
+        width = start * (1 - far) + end * far
+        made = flux(study, unit.index, spot_matters=False)
+        records.append(replace(made, spot_fwhm=width, spot_fwhm_stderr=1e-4 * width))
+    found = broadening.conclude(study, records).statements
+    assert [s.true for s in found if s.text.startswith("The divergence") and "fwhm" in s.text] == [alike]
 
 
 @pytest.mark.parametrize("below", [True, False])
@@ -164,26 +187,46 @@ def test_finding_on_gating_and_quality(gate_helps: bool) -> None:
         veil = 0.0 if clear or (unit.scene.gate is not None) == gate_helps else 0.8
         records.append(picture(1.0, 0.01, image=slit(1.0 if clear else 0.8, veil)))
     conclusion = pictures.conclude(study, records)
-    assert verdicts(conclusion, "Gating raises") == [gate_helps] * 4
+    assert verdicts(conclusion, "Gating raises") == [gate_helps] * 8
+    own = verdicts(conclusion, "By the paper's own table")
+    assert own == [False, False], "SSIM comes nearer to the experiment's, PSNR goes away from it"
     assert {row["source"] for row in conclusion.rows} >= {"paper: experiment", "paper: simulation, gated"}
 
 
-@pytest.mark.parametrize("rougher_is_darker", [True, False])
-def test_finding_on_roughness(rougher_is_darker: bool) -> None:
+@pytest.mark.parametrize(
+    ("rough", "verdict"), [(0.3, [False, True]), (1.5, [False, False]), (0.899, [False, False])]
+)
+def test_finding_on_roughness(rough: float, verdict: list[bool]) -> None:
+    """Equal brightness is no fall, nor is a fall within the errors; a real one is."""
     study = load_study(STUDIES / "fig7_table2.toml")
-    brightness = {0.001: 1.0, 0.01: 0.9, 0.1: 0.3 if rougher_is_darker else 1.5}
-    rows, columns = 60, 60
+    brightness = {0.001: 0.9, 0.01: 0.9, 0.1: rough}
     records = []
     for unit in study.units:
-        figure = pictures._figure_pixels(_point(unit.scene, np.zeros((rows, columns))))
+        figure = figure_pixels(_point(unit.scene, np.zeros((60, 60))))
         light = brightness[unit.scene.target.figure.roughness]  # type: ignore[union-attr]
-        records.append(picture(1.0, 0.01, image=(0.05 + light * figure) * 1e-13))
+        record = picture(1.0, 0.01, image=(0.05 + light * figure) * 1e-13)
+        records.append(replace(record, seed=unit.index))
     conclusion = pictures.conclude(study, records)
-    assert verdicts(conclusion, "Roughness lowers") == [rougher_is_darker] * 2
+    assert verdicts(conclusion, "Roughness lowers") == verdict * 2
+
+
+@pytest.mark.parametrize("blurred", [True, False])
+def test_finding_on_mssim(blurred: bool) -> None:
+    """A darker copy keeps its structure, so MSSIM stays above SSIM; one with other details does not."""
+    study = load_study(STUDIES / "fig7_table2.toml")
+    noise = np.random.default_rng(1).random((60, 60))
+    records = []
+    for unit in study.units:
+        rough = unit.scene.target.figure.roughness == 0.1  # type: ignore[union-attr]
+        image = slit(0.3, 0.0) if rough and blurred else slit(1.0, 0.0)
+        image = image + (1e-13 * noise if rough and not blurred else 0.0)
+        records.append(replace(picture(1.0, 0.01, image=image), seed=unit.index))
+    found = pictures.conclude(study, records).statements
+    assert [s.true for s in found if s.text == "MSSIM lies above SSIM (same gain)."] == [blurred]
 
 
 def _point(scene: Any, image: Any) -> Any:
-    return pictures.Point(scene, "", replace(picture(1.0, 0.01), energy=image))
+    return Point(scene, "", replace(picture(1.0, 0.01), energy=image))
 
 
 def test_ratios_of_independent_estimates() -> None:
