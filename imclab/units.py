@@ -105,3 +105,14 @@ def sum_of(first: str, second: str) -> str:
 
 def _plain(text: str) -> str:
     return text.replace("µ", "u").replace("μ", "u")
+
+
+def si_unit_of(text: Any) -> str:
+    """Return the SI unit that a quantity in words comes to, ``"5 cm"`` to ``"m"``; nothing for the rest."""
+    for kind, (unit, _) in SI_UNIT.items():
+        try:
+            parse(text, kind)
+        except UnitError:
+            continue
+        return unit
+    return ""

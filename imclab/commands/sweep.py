@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from imclab.commands.console import JSON_OPTION, Progress, emit
+from imclab.commands.run_options import Estimator, Packets, RelError, Seconds, Seed
 
 
 def sweep(
@@ -29,11 +30,11 @@ def sweep(
     distances: Annotated[
         str | None, typer.Option(help='Planes of the one-way run, as "1 m, 5 m" or "1 m to 30 m in 10".')
     ] = None,
-    rel_error: Annotated[float | None, typer.Option(help="Stop each unit at this relative error.")] = None,
-    seconds: Annotated[float | None, typer.Option(help="Stop each unit after so long.")] = None,
-    packets: Annotated[float | None, typer.Option(help="Stop each unit after so many packets.")] = None,
-    estimator: Annotated[str | None, typer.Option(help="auto, analog, expected or two-sided.")] = None,
-    seed: Annotated[int | None, typer.Option(help="Seed of every unit; else that of the scene.")] = None,
+    rel_error: RelError = None,
+    seconds: Seconds = None,
+    packets: Packets = None,
+    estimator: Estimator = None,
+    seed: Seed = None,
     workers: Annotated[int | None, typer.Option(min=1, help="Processes; default: one a processor.")] = None,
     dask: Annotated[str | None, typer.Option(help="Scheduler of a Dask cluster, tcp://HOST:PORT.")] = None,
     as_json: Annotated[bool, JSON_OPTION] = False,
@@ -42,10 +43,14 @@ def sweep(
 
     Example: imclab sweep data/scenes/tank.toml --set medium.attenuation="0.42 1/m to 1.42 1/m in 6" -o DIR
     """
-    from imclab.errors import InterruptedRunError
+    from imclab.errors import Fault, InputError, InterruptedRunError
     from imclab.scene import load_scene
     from imclab.sweep import OneWay, SweepFailedError, parse_axis, parse_distances, plan, run, with_run
 
+    if not settings:
+        single = "imclab transmit" if one_way or distances else "imclab simulate"
+        wanted = 'a key and its values, for example --set medium.attenuation="0.42 1/m,1.42 1/m"'
+        raise InputError("--set", [Fault("--set", "nothing", wanted, f"For one scene: {single}")])
     base = with_run(
         load_scene(scene),
         rel_error=rel_error,
@@ -55,17 +60,16 @@ def sweep(
         seed=seed,
     )
     planes = OneWay(parse_distances(distances)) if one_way or distances else None
-    axes = [parse_axis(setting) for setting in settings or []]
+    axes = [parse_axis(setting) for setting in settings]
     units, refused = plan(base, axes, one_way=planes, zipped=zipped)
     progress = Progress()
     outcome = run(units, output, refused=refused, workers=workers, dask=dask, progress=progress)
     progress.close()
     words = f"{output}: {len(outcome.records)} of {len(units) + len(refused)} units finished"
-    emit(
-        outcome.summary() | {"folder": str(output)},
-        f"{words} ({outcome.resumed} found finished)",
-        as_json=as_json,
-    )
+    told = f"{words} ({outcome.resumed} found finished); see table.csv and plot.png"
+    if outcome.other_units:
+        told += f"\n  {outcome.other_units} results of other sweeps are kept there, but are not in the table"
+    emit(outcome.summary() | {"folder": str(output)}, told, as_json=as_json)
     if outcome.interrupted:
         raise InterruptedRunError(f"interrupted; {words}. The same command continues.")
     if outcome.failures:

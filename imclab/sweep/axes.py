@@ -19,6 +19,10 @@ _RANGE = re.compile(
     rf"(?P<start>{_NUMBER})\s*(?P<unit_of_start>\D*?|\D.*?)\s+to\s+(?P<stop>{_NUMBER})\s*(?P<unit>\D.*?|)"
     r"\s+in\s+(?P<count>\d+)(?P<log>\s+log)?"
 )
+_HALF_RANGE = re.compile(rf"{_NUMBER}.*\s+to\s+{_NUMBER}.*")
+_RANGE_WANTED = (
+    'START to STOP in COUNT, for example "0.1 1/m to 10 1/m in 8", or "... in 8 log" for equal ratios'
+)
 _VALUES_WANTED = (
     'KEY=VALUES, values separated by commas or a range, for example medium.attenuation="0.42 1/m,1.42 1/m" '
     'or medium.attenuation="0.1 1/m to 10 1/m in 8 log"'
@@ -83,7 +87,8 @@ def combine(axes: Sequence[Axis], *, zipped: bool = False) -> list[dict[str, Any
     ----------
     axes : sequence of Axis
     zipped : bool
-        Take first values together, second values together, and so on, instead of all combinations.
+        Take first values together, second values together, and so on, instead of all combinations;
+        a list of one value goes with all.
 
     Raises
     ------
@@ -96,10 +101,13 @@ def combine(axes: Sequence[Axis], *, zipped: bool = False) -> list[dict[str, Any
         raise InputError("--set", [Fault(key, "the key twice", "each key once") for key in twice])
     if not zipped:
         return [dict(zip(keys, point, strict=True)) for point in itertools.product(*(a.values for a in axes))]
-    if len({len(axis.values) for axis in axes}) > 1:
+    count = max((len(axis.values) for axis in axes), default=1)
+    if any(len(axis.values) not in (1, count) for axis in axes):
         lengths = ", ".join(f"{axis.key} {len(axis.values)}" for axis in axes)
-        raise InputError("--zip", [Fault("--set", f"lists of lengths {lengths}", "lists of one length")])
-    return [dict(zip(keys, point, strict=True)) for point in zip(*(a.values for a in axes), strict=True)]
+        wanted = "lists of one length, or of one value"
+        raise InputError("--zip", [Fault("--set", f"lists of lengths {lengths}", wanted)])
+    lists = [axis.values * (count // len(axis.values)) for axis in axes]
+    return [dict(zip(keys, point, strict=True)) for point in zip(*lists, strict=True)] or [{}]
 
 
 def _split(text: str) -> list[str]:
@@ -127,6 +135,8 @@ def _read(item: str, key: str) -> list[Any]:
     found = _RANGE.fullmatch(item)
     if found:
         return _range(found, key)
+    if _HALF_RANGE.fullmatch(item):
+        raise InputError("--set", [Fault(key, f'"{item}"', _RANGE_WANTED)])
     try:
         return [tomllib.loads(f"value = {item}")["value"]]
     except tomllib.TOMLDecodeError:

@@ -46,6 +46,8 @@ class Outcome:
     resumed : int
         How many records were found finished.
     interrupted : bool
+    other_units : int
+        How many results of other sweeps the folder holds; they are kept, but not in the tables.
     """
 
     units: tuple[Unit, ...]
@@ -53,6 +55,7 @@ class Outcome:
     failures: tuple[Refused, ...] = ()
     resumed: int = 0
     interrupted: bool = False
+    other_units: int = 0
 
     @property
     def cpu_seconds(self) -> float:
@@ -105,6 +108,7 @@ class Outcome:
             "finished": len(self.records),
             "resumed": self.resumed,
             "interrupted": self.interrupted,
+            "other_units": self.other_units,
             "cpu_seconds": self.cpu_seconds,
             "failed": [
                 {"unit": f.index, "changes": dict(f.changes), "error": f.reason} for f in self.failures

@@ -8,6 +8,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from pathlib import Path
 
 from imclab.errors import Fault, InputError, OutputError
+from imclab.files import check_folder
 from imclab.sweep.outcome import Outcome
 from imclab.sweep.plot import save_plot
 from imclab.sweep.units import Refused, Unit
@@ -65,9 +66,11 @@ def run(
     Raises
     ------
     InputError, OutputError
-        The cluster cannot be used; the folder cannot be written to or another sweep works in it.
+        The cluster cannot be used; the folder cannot be written to, holds files of something else, or
+        another sweep works in it.
     """
     folder = Path(folder)
+    _refuse_other_files(folder)
     with _only_one_sweep(folder):
         records = {unit.index: found for unit in units if (found := _finished(unit, folder)) is not None}
         resumed, failures, interrupted = len(records), list(refused), False
@@ -94,6 +97,7 @@ def run(
             failures=tuple(sorted(failures, key=lambda failure: failure.index)),
             resumed=resumed,
             interrupted=interrupted,
+            other_units=len({path.stem for path in (folder / "units").glob("*.h5")} - {u.key for u in units}),
         )
         outcome.save(folder)
         save_plot(outcome, folder / "plot.png")
@@ -117,6 +121,14 @@ def _finished(unit: Unit, folder: Path) -> Record | None:
         return unit.record_type.load(_file(unit, folder))
     except (InputError, OSError, KeyError, TypeError):
         return None
+
+
+def _refuse_other_files(folder: Path) -> None:
+    """Refuse a folder whose files a sweep has not written: it could overwrite one of them."""
+    check_folder(folder)
+    if folder.is_dir() and any(folder.iterdir()) and not (folder / "units" / ".lock").is_file():
+        wanted = "a folder that is empty, not there yet, or holds an earlier sweep"
+        raise InputError(str(folder), [Fault("output", "a folder with other files in it", wanted)])
 
 
 @contextlib.contextmanager

@@ -164,11 +164,15 @@ def on_cluster(units: Iterable[Unit], work: Work, *, address: str) -> Generator[
     except ImportError:
         advice = 'Install it with: python -m pip install "imclab[cluster]"'
         raise InputError("--dask", [Fault("dask", "not installed", "dask and distributed", advice)]) from None
+    wanted = "the address of a running scheduler, for example tcp://127.0.0.1:8786"
+    try:
+        distributed.comm.get_address_host_port(address)
+    except ValueError:  # told here, because a client made with such an address does not close quietly
+        raise InputError("--dask", [Fault("scheduler", f'"{address}"', wanted)]) from None
     try:
         client = distributed.Client(address, timeout=SECONDS_FOR_SCHEDULER, set_as_default=False)
-    except (OSError, TimeoutError, ValueError) as error:
+    except (OSError, TimeoutError) as error:
         came = f"{address}, where no scheduler answers ({type(error).__name__})"
-        wanted = "the address of a running scheduler, for example tcp://127.0.0.1:8786"
         raise InputError(
             "--dask", [Fault("scheduler", came, wanted, "Start one with: dask scheduler")]
         ) from None

@@ -157,6 +157,14 @@ def test_a_wrong_key_is_told_before_anything_runs(tmp_path: Path, capsys: pytest
     assert not (tmp_path / "out").exists()
 
 
+def test_without_a_key_to_vary_one_is_told_of_simulate(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["sweep", str(SCENE), "-o", str(tmp_path / "out")]) == 2
+    assert "For one scene: imclab simulate" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
 def test_without_the_cluster_extra_one_is_told_what_to_install(tmp_path: Path) -> None:
     (tmp_path / "distributed.py").write_text("raise ImportError('not here')\n")
     words = command(SCENE, *QUICK, *seeds(2), "-o", tmp_path / "out", "--dask", "tcp://127.0.0.1:9")

@@ -9,9 +9,10 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from imclab.errors import InputError
-from imclab.sweep import Axis, OneWay, SweepFailedError, Unit, plan, run, with_run
+from imclab.sweep import Axis, OneWay, SweepFailedError, Unit, plan, plot, run, with_run
 from imclab.sweep.workers import Work
 from tests.unit import sweep_work
 
@@ -141,3 +142,43 @@ def test_two_sweeps_do_not_share_a_folder(tmp_path: Path) -> None:
         return sweep_work.result_of(unit, threads)
 
     assert not run_here(seeds(1), tmp_path, nested).failures
+
+
+def test_files_of_something_else_are_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "table.csv").write_text("mine")
+    with pytest.raises(InputError, match="other files in it"):
+        run_here(seeds(1), tmp_path, sweep_work.forbidden)
+    assert (tmp_path / "table.csv").read_text() == "mine"
+
+
+def test_results_of_other_sweeps_in_the_folder_are_counted_and_kept(tmp_path: Path) -> None:
+    assert run_here(seeds(1, 2, 3), tmp_path).other_units == 0
+    narrower = run_here(seeds(3, 4), tmp_path)
+    assert (narrower.other_units, narrower.resumed) == (2, 1)
+    assert run_here(seeds(1, 2), tmp_path, sweep_work.forbidden).resumed == 2
+
+
+@pytest.mark.parametrize("address", ["nonsense", "foo://bar:1", "tcp://host"])
+def test_an_address_that_is_none_is_told_at_once(tmp_path: Path, address: str) -> None:
+    pytest.importorskip("distributed")
+    with pytest.raises(InputError, match="the address of a running scheduler"):
+        run_here(seeds(1), tmp_path, dask=address)
+
+
+def drawn(units: list[Unit], tmp_path: Path) -> Figure:
+    """The plot of a sweep, as it was before it became a file."""
+    outcome = run_here(units, tmp_path)
+    return plot.figure_of(outcome)
+
+
+def test_the_plot_names_units_and_only_what_tells_lines_apart(tmp_path: Path) -> None:
+    depths = Axis("medium.attenuation", ("0.42 1/m", "1 1/m", "1.42 1/m"))
+    other = Axis("laser.spot_fwhm", ("1 mm", "2 mm", "3 mm"))
+    constant = Axis("medium.albedo", (0.5,))
+    zipped = drawn(plan(sweep_work.scene(), [depths, other, constant], zipped=True)[0], tmp_path / "zip")
+    assert zipped.axes[0].get_xlabel() == "medium.attenuation (1/m)"
+    assert len(zipped.axes[0].containers) == 1, "zipped lists make one line"
+    assert not zipped.legends
+    grid = drawn(plan(sweep_work.scene(), [depths, other, constant])[0], tmp_path / "grid")
+    names = [text.get_text() for text in grid.legends[0].get_texts()]
+    assert names == ["laser.spot_fwhm 0.001 m", "laser.spot_fwhm 0.002 m", "laser.spot_fwhm 0.003 m"]

@@ -42,6 +42,8 @@ def test_reads_lists_and_ranges(text: str, values: tuple[object, ...]) -> None:
         ("a=1 m to 2 cm in 3", "one unit"),
         ("a=1 to 2 in 1", "2 to"),
         ("a=0 to 2 in 3 log", "above zero"),
+        ("a=0.1 1/m to 2 1/m", "START to STOP in COUNT"),
+        ("a=0.1 1/m to 2 1/m in 3 lin", "START to STOP in COUNT"),
     ],
 )
 def test_tells_what_is_wrong_with_the_values(text: str, told: str) -> None:
@@ -61,14 +63,19 @@ def test_grid_takes_all_combinations_and_zip_the_lists_side_by_side() -> None:
     axes = [Axis("a", (1, 2)), Axis("b", (3, 4))]
     assert combine(axes) == [{"a": 1, "b": 3}, {"a": 1, "b": 4}, {"a": 2, "b": 3}, {"a": 2, "b": 4}]
     assert combine(axes, zipped=True) == [{"a": 1, "b": 3}, {"a": 2, "b": 4}]
-    assert combine([]) == [{}]
+    assert combine([]) == combine([], zipped=True) == [{}]
+
+
+def test_a_list_of_one_value_goes_with_all_that_are_zipped() -> None:
+    axes = [Axis("a", (1,)), Axis("b", (3, 4))]
+    assert combine(axes, zipped=True) == [{"a": 1, "b": 3}, {"a": 1, "b": 4}]
 
 
 def test_refuses_a_key_twice_and_lists_that_cannot_be_zipped() -> None:
     with pytest.raises(InputError, match="twice"):
         combine([Axis("a", (1,)), Axis("a", (2,))])
-    with pytest.raises(InputError, match="lengths a 2, b 1"):
-        combine([Axis("a", (1, 2)), Axis("b", (3,))], zipped=True)
+    with pytest.raises(InputError, match="lengths a 2, b 3"):
+        combine([Axis("a", (1, 2)), Axis("b", (3, 4, 5))], zipped=True)
 
 
 def test_distances_have_units() -> None:
