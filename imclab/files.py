@@ -32,6 +32,22 @@ def check_output(path: str | Path) -> Path:
     raise OutputError(f"{path}: cannot be written ({reason}). Name a file in a folder that exists.")
 
 
+def check_folder(path: str | Path) -> Path:
+    """Return ``path`` when a folder is there or can be made there; tell so before long work.
+
+    Raises
+    ------
+    OutputError
+        When the path, or what it lies in, is a file or may not be written to.
+    """
+    path = Path(path)
+    nearest = next(place for place in (path, *path.absolute().parents) if place.exists())
+    if nearest.is_dir() and os.access(nearest, os.W_OK):
+        return path
+    reason = f"{nearest} {'may not be written to' if nearest.is_dir() else 'is a file'}"
+    raise OutputError(f"{path}: no folder can be made there ({reason}). Name a folder in one that exists.")
+
+
 @contextmanager
 def written_whole(path: str | Path) -> Iterator[Path]:
     """Give a temporary name beside ``path``; rename it to ``path`` only when the block succeeds.
@@ -69,6 +85,7 @@ def folder_written_whole(path: str | Path) -> Iterator[Path]:
     if folder.is_dir() and any(folder.iterdir()):
         wanted = "a folder that is empty or does not exist"
         raise InputError(str(folder), [Fault("output", "a folder with files in it", wanted)])
+    check_folder(folder)
     temporary = folder.with_name(f".{folder.name}.{os.getpid()}.{secrets.token_hex(4)}.part")
     try:
         temporary.mkdir(parents=True)

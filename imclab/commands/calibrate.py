@@ -28,12 +28,12 @@ def calibrate(
 ) -> None:
     """Calibrate the camera: response, intensifier gain, noise, pixel maps, with uncertainties."""
     import calibration
-    from imclab.errors import Fault, InputError
+    from imclab.files import check_folder, check_output
     from imclab.report.calibration_page import summary, write_page
 
-    if not output.parent.is_dir():
-        wanted = "a file in a folder that exists"
-        raise InputError("calibrate", [Fault("--output", f"{output}, whose folder does not exist", wanted)])
+    check_output(output)
+    if report is not None:
+        check_folder(report)
     progress = Progress()
     try:
         camera = calibration.calibrate(folder, pattern=pattern, progress=progress)

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from imclab.commands.console import JSON_OPTION, Progress, emit
+from imclab.commands.run_options import Threads, between_0_and_1
 
 
 def report(
@@ -18,9 +19,12 @@ def report(
         Path, typer.Option("-o", "--output", help="Folder: empty, new, or of an earlier run.")
     ] = Path("report"),
     rel_error: Annotated[
-        float | None, typer.Option(help="Relative error of each simulated picture; else the experiment's.")
+        float | None,
+        typer.Option(
+            callback=between_0_and_1, help="Relative error of each simulated picture; else the experiment's."
+        ),
     ] = None,
-    threads: Annotated[int | None, typer.Option(help="For the simulations; all when left out.")] = None,
+    threads: Threads = None,
     from_saved: Annotated[
         Path | None, typer.Option(help="Render the page again from this report's saved numbers.")
     ] = None,

@@ -8,20 +8,21 @@ from typing import Annotated
 import typer
 
 from imclab.commands.console import JSON_OPTION, Progress, emit, told
+from imclab.commands.run_options import Estimator, Packets, RelError, Seconds, Seed, Threads
 
 
 def simulate(
     scene: Annotated[Path, typer.Argument(help="The scene file.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="The result, an HDF5 file.")],
-    rel_error: Annotated[float | None, typer.Option(help="Stop at this relative error of the total.")] = None,
-    seconds: Annotated[float | None, typer.Option(help="Stop after so long.")] = None,
-    packets: Annotated[float | None, typer.Option(help="Stop after so many packets.")] = None,
-    estimator: Annotated[
-        str | None, typer.Option(help="auto, analog, expected or two-sided; else that of the scene.")
+    rel_error: RelError = None,
+    seconds: Seconds = None,
+    packets: Packets = None,
+    estimator: Estimator = None,
+    seed: Seed = None,
+    threads: Threads = None,
+    time_bins: Annotated[
+        int | None, typer.Option(min=0, max=1000, help="Bins of the time histogram; 0: none.")
     ] = None,
-    seed: Annotated[int | None, typer.Option(help="The random numbers follow from it.")] = None,
-    threads: Annotated[int | None, typer.Option(help="Threads; default: all.")] = None,
-    time_bins: Annotated[int | None, typer.Option(help="Bins of the time histogram; 0: none.")] = None,
     verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Tell what was left out and why.")] = False,
     as_json: Annotated[bool, JSON_OPTION] = False,
 ) -> None:

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from imclab.commands.console import JSON_OPTION, Progress, emit, told
+from imclab.commands.run_options import Packets, RelError, Seconds, Seed, Threads
 
 
 def transmit(
@@ -17,11 +18,11 @@ def transmit(
         str | None,
         typer.Option(help='Planes, as "0.5 m, 1 m" or "1 m to 30 m in 10"; default: the target\'s.'),
     ] = None,
-    rel_error: Annotated[float | None, typer.Option(help="Stop at this relative error.")] = None,
-    seconds: Annotated[float | None, typer.Option(help="Stop after so long.")] = None,
-    packets: Annotated[float | None, typer.Option(help="Stop after so many packets.")] = None,
-    seed: Annotated[int | None, typer.Option(help="The random numbers follow from it.")] = None,
-    threads: Annotated[int | None, typer.Option(help="Threads; default: all.")] = None,
+    rel_error: RelError = None,
+    seconds: Seconds = None,
+    packets: Packets = None,
+    seed: Seed = None,
+    threads: Threads = None,
     as_json: Annotated[bool, JSON_OPTION] = False,
 ) -> None:
     """Send the pulse one way: energy through and back, spot and pulse widths at each plane.

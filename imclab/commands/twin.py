@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from imclab.commands.console import JSON_OPTION, Progress, emit
+from imclab.commands.run_options import between_0_and_1
 
 
 def twin(
@@ -20,7 +21,9 @@ def twin(
         list[Path] | None, typer.Option(help="Picture of a target; may be repeated. Else the scene's own.")
     ] = None,
     frames: Annotated[int, typer.Option(min=1, help="Frames for each condition.")] = 8,
-    rel_error: Annotated[float, typer.Option(help="Relative error of the true pictures.")] = 0.002,
+    rel_error: Annotated[
+        float, typer.Option(callback=between_0_and_1, help="Relative error of the true pictures.")
+    ] = 0.002,
     seed: Annotated[int, typer.Option(min=0, help="Of everything random.")] = 1,
     as_json: Annotated[bool, JSON_OPTION] = False,
 ) -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from imclab import provenance
 from imclab.errors import Fault, InputError, OutputError
-from imclab.files import written_whole
+from imclab.files import check_folder, written_whole
 
 LEDGER = "inputs.json"
 
@@ -21,6 +21,8 @@ class Store:
     ------
     InputError
         When the folder is a file, or holds files that no earlier report left.
+    OutputError
+        When it cannot be made.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -28,6 +30,7 @@ class Store:
         self._ledger_path = folder / LEDGER
         if folder.exists() and not folder.is_dir():
             raise InputError(str(folder), [Fault("output", "a file", "a folder")])
+        check_folder(folder)
         strangers = folder.is_dir() and any(folder.iterdir()) and not self._ledger_path.is_file()
         if strangers:
             wanted = "a folder that is empty, not there yet, or holds an earlier report"

@@ -12,6 +12,7 @@ import imclab
 
 ROOT = Path(__file__).parents[2]
 SCENE = ROOT / "data/scenes/tank.toml"
+EXPERIMENT = ROOT / "data/experiments/tank/experiment.toml"
 
 
 def run(*words: str | Path) -> subprocess.CompletedProcess[str]:
@@ -44,6 +45,7 @@ def test_without_words_it_shows_its_help_and_nothing_else() -> None:
         (["twin", "none.toml", "-o", "out"], "none.toml"),
         (["twin", SCENE, "-o", "out", "--optical-depths", "a,b"], "optical-depths"),
         (["twin", SCENE, "-o", "out", "--mask", "none.png"], "none.png"),
+        (["report", EXPERIMENT, "-o", SCENE / "below"], "is a file). Name a folder in one that exists"),
     ],
 )
 def test_a_mistake_is_told_in_one_block_and_leaves_nothing(

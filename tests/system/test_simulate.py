@@ -83,9 +83,13 @@ def test_a_relative_error_is_reached() -> None:
 @pytest.mark.parametrize(
     ("words", "told_words"),
     [
-        (["simulate", str(SLIT), "-o", "x.h5", "--packets", "-3"], "packets: got -3"),
+        (["simulate", str(SLIT), "-o", "x.h5", "--packets", "-3"], "'--packets': got -3; wanted"),
+        (["simulate", str(SLIT), "-o", "x.h5", "--packets", "nan"], "'--packets': got nan; wanted"),
+        (["simulate", str(SLIT), "-o", "x.h5", "--seconds", "0"], "'--seconds': got 0; wanted"),
+        (["simulate", str(SLIT), "-o", "x.h5", "--seed", "-1"], "'--seed': got -1; wanted"),
+        (["transmit", str(ONE_WAY), "-o", "x.h5", "--rel-error", "2"], "'--rel-error': got 2; wanted"),
         (["simulate", str(SLIT), "-o", "x.h5", "--estimator", "best"], "estimator"),
-        (["simulate", str(SLIT), "-o", "x.h5", "--threads", "0"], "threads"),
+        (["simulate", str(SLIT), "-o", "x.h5", "--threads", "0"], "'--threads': got 0; wanted"),
         (["simulate", "none.toml", "-o", "x.h5"], "none.toml"),
         (["transmit", str(ONE_WAY), "-o", "x.h5", "--distances", "3 kg"], "distances"),
         (["transmit", str(ONE_WAY), "-o", "x.h5", "--distances", "-1 m", "--packets", "10"], "distances"),

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from imclab.errors import InputError, OutputError
-from imclab.files import folder_written_whole, written_whole
+from imclab.files import check_folder, folder_written_whole, written_whole
 
 
 def test_a_file_appears_only_when_the_block_succeeds(tmp_path: Path) -> None:
@@ -40,3 +40,13 @@ def test_a_folder_with_something_in_it_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="empty"), folder_written_whole(tmp_path):
         pass
     assert (tmp_path / "kept").read_text() == "mine"
+
+
+def test_a_folder_below_a_file_is_told_with_what_to_do(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("mine")
+    for place in (tmp_path / "file", tmp_path / "file" / "a" / "b"):
+        with pytest.raises(OutputError, match=r"file is a file\). Name a folder"):
+            check_folder(place)
+    assert check_folder(tmp_path / "new" / "deeper") == tmp_path / "new" / "deeper"
+    with pytest.raises(OutputError, match="Name a folder"), folder_written_whole(tmp_path / "file" / "a"):
+        pass
