@@ -33,13 +33,18 @@ def simulate(
     import imclab
     from imclab.errors import InterruptedRunError
     from imclab.files import check_output
+    from imclab.transport.arrival import NOTHING, gate_beside_target
+    from imclab.transport.setup import setup_of
     from imclab.transport.simulation import DEFAULT_TIME_BINS
 
     check_output(output)
+    loaded = imclab.load_scene(scene)
     progress = Progress()
+    for note in gate_beside_target(loaded, setup_of(loaded)):
+        progress(f"Note: {note}.", final=True)
     try:
         result = imclab.simulate(
-            imclab.load_scene(scene),
+            loaded,
             rel_error=rel_error,
             seconds=seconds,
             packets=packets,
@@ -74,6 +79,7 @@ def simulate(
         f"(backscatter {result.backscatter_total:.3g} J), {result.estimator}, "
         f"{result.packets:.3g} packets, {result.cpu_seconds:.2f} s of CPU"
     )
-    emit(summary, "\n  ".join([words, *(result.notes if verbose else ())]), as_json=as_json)
+    notes = [note for note in result.notes if verbose or note.startswith(NOTHING)]
+    emit(summary, "\n  ".join([words, *notes]), as_json=as_json)
     if result.interrupted:
         raise InterruptedRunError(f"interrupted; what was finished is in {output}")

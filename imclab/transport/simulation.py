@@ -72,6 +72,7 @@ def simulate(
     InputError
         For arguments out of range and for scenes that cannot be simulated.
     """
+    from imclab.transport.arrival import gate_beside_target, nothing_arrived
     from imclab.transport.estimators import choose
     from imclab.transport.request import check_threads, limits, seed_of
     from imclab.transport.runner import MeanLedger, run
@@ -108,7 +109,10 @@ def simulate(
         cpu_seconds=effort.cpu_seconds,
         wall_seconds=effort.wall_seconds,
         threads=effort.threads,
-        notes=chosen.notes + effort.notes,
+        notes=gate_beside_target(scene, setup)
+        + nothing_arrived(scene, parts["total"])
+        + chosen.notes
+        + effort.notes,
         interrupted=effort.interrupted,
         versions=versions(),
     )
