@@ -1,6 +1,6 @@
 """A sweep killed twice has the bits of one that is not: ``python -m tests.figures.sweep_kills``.
 
-24 scenes: three waters, two distances, two targets and two seeds. With two worker processes, one is killed with
+24 scenes: three waters, two distances, two targets and two seeds. With two worker processes, one is killed by
 ``kill -9`` and then the whole sweep; the same command goes on. The same on a local Dask cluster, where a
 worker process is killed and then the sweep. Compared with one uninterrupted run by one worker: every
 picture and its errors, and the tables byte for byte. Two and four workers without kills come last.
