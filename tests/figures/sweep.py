@@ -1,12 +1,14 @@
-"""How much faster two workers finish a sweep than one: ``python -m tests.figures.sweep [TURNS]``.
+"""How much faster two workers finish a sweep than one: ``python -m tests.figures.sweep [TURNS [MINUTES]]``.
 
-A local Dask cluster with one worker process and one with two, the same 24 scenes, in turns. Each turn gives
-one ratio of wall times, so that a load that comes and goes meets both alike; their median is told. The
-bits of all runs are compared.
+A local Dask cluster with one worker process and one with two, the same 24 scenes, in turns. Each turn
+gives one ratio of wall times. A turn during which other programs took a tenth of the processors or more is
+shown and not counted; turns go on until enough are counted or the minutes are over. The bits of all runs
+are compared.
 """
 
 from __future__ import annotations
 
+import os
 import statistics
 import sys
 import tempfile
@@ -22,6 +24,7 @@ from imclab.sweep import Axis, Unit, plan, run, with_run
 SCENE = Path(__file__).parents[2] / "data/scenes/lambertian_slit.toml"
 PACKETS = 4e5
 TURNS = 3
+MOST_BY_OTHERS = 0.1
 
 
 def units() -> list[Unit]:
@@ -37,45 +40,65 @@ def energies(folder: Path, work: list[Unit]) -> bytes:
     return found
 
 
-def timed(work: list[Unit], **where: object) -> tuple[float, bytes]:
+def processor_seconds() -> tuple[float, float]:
+    """Seconds of processor time spent on this machine, and of them by this process and its workers."""
+    import psutil
+
+    times = psutil.cpu_times()
+    here = psutil.Process()
+    own = 0.0
+    for process in (here, *here.children(recursive=True)):
+        spent = process.cpu_times()
+        own += spent.user + spent.system
+    return sum(times) - times.idle - times.iowait, own
+
+
+def timed(work: list[Unit], address: str) -> tuple[float, float, bytes]:
+    """Return seconds, the share of the processors that others took meanwhile, and the bits."""
     with tempfile.TemporaryDirectory() as folder:
+        all_before, own_before = processor_seconds()
         start = time.perf_counter()
-        outcome = run(work, folder, **where)  # type: ignore[arg-type]
+        outcome = run(work, folder, dask=address)
         seconds = time.perf_counter() - start
+        all_after, own_after = processor_seconds()
         assert len(outcome.records) == len(work), outcome.failures
-        return seconds, energies(Path(folder), work)
+        others = (all_after - all_before) - (own_after - own_before)
+        share = max(0.0, others) / (seconds * len(os.sched_getaffinity(0)))
+        return seconds, share, energies(Path(folder), work)
 
 
 def main() -> None:
     from distributed import Client, LocalCluster
 
+    turns = int(sys.argv[1]) if len(sys.argv) > 1 else TURNS
+    end = time.monotonic() + 60.0 * (float(sys.argv[2]) if len(sys.argv) > 2 else 10.0)
     work = units()
-    seconds: dict[str, list[float]] = {}
-    bits = set()
     clusters = {
         count: LocalCluster(n_workers=count, threads_per_worker=1, processes=True, dashboard_address=":0")
         for count in (1, 2)
     }
-    for (
-        count,
-        cluster,
-    ) in clusters.items():  # every worker compiles, or reads its cache, before the clock runs
-        with Client(cluster) as client:
+    for count, cluster in clusters.items():
+        with Client(cluster) as client:  # every worker compiles, or reads its cache, before the clock runs
             client.run(lambda unit: unit.perform(1).total, work[0])
         assert len(cluster.workers) == count
-    for _ in range(int(sys.argv[1]) if len(sys.argv) > 1 else TURNS):
-        for count, cluster in clusters.items():
-            taken, found = timed(work, dask=cluster.scheduler_address)
-            seconds.setdefault(f"Dask, {count} worker processes", []).append(taken)
-            bits.add(found)
-    for name, values in seconds.items():
-        print(f"{name}: median {statistics.median(values):.2f} s of {[round(value, 2) for value in values]}")
-    one, two = (seconds[f"Dask, {count} worker processes"] for count in (1, 2))
-    ratios = [before / after for before, after in zip(one, two, strict=True)]
-    print(
-        f"two over one: {statistics.median(ratios):.2f} times as fast, median of "
-        f"{[round(ratio, 2) for ratio in ratios]}; equal bits: {len(bits) == 1}"
-    )
+    quiet: list[float] = []
+    bits = set()
+    while len(quiet) < turns and time.monotonic() < end:
+        (one, busy_one, found_one), (two, busy_two, found_two) = (
+            timed(work, clusters[count].scheduler_address) for count in (1, 2)
+        )
+        bits |= {found_one, found_two}
+        counts = max(busy_one, busy_two) < MOST_BY_OTHERS
+        if counts:
+            quiet.append(one / two)
+        print(
+            f"1 worker {one:.2f} s, 2 workers {two:.2f} s: {one / two:.2f} times as fast; others took "
+            f"{100 * busy_one:.0f} and {100 * busy_two:.0f} % of the processors{'' if counts else ': not counted'}",
+            flush=True,
+        )
+    print(f"equal bits: {len(bits) == 1}")
+    if quiet:
+        print(f"median of {len(quiet)} quiet turns: {statistics.median(quiet):.2f} times as fast")
     for cluster in clusters.values():
         cluster.close()
 
