@@ -1,9 +1,9 @@
 """How much faster two workers finish a sweep than one: ``python -m tests.figures.sweep [TURNS [MINUTES]]``.
 
 A local Dask cluster with one worker process and one with two, the same 24 scenes, in turns. Each turn
-gives one ratio of wall times. A turn during which other programs took a tenth of the processors or more is
-shown and not counted; turns go on until enough are counted or the minutes are over. The bits of all runs
-are compared.
+gives one ratio of wall times. A turn starts when other programs are quiet; one during which they took a tenth
+of the processors or more is shown and not counted. Turns go on until enough are counted or the minutes are
+over. The bits of all runs are compared.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ SCENE = Path(__file__).parents[2] / "data/scenes/lambertian_slit.toml"
 PACKETS = 4e5
 TURNS = 3
 MOST_BY_OTHERS = 0.1
+SECONDS_OF_QUIET = 1.5
 
 
 def units() -> list[Unit]:
@@ -51,6 +52,17 @@ def processor_seconds() -> tuple[float, float]:
         spent = process.cpu_times()
         own += spent.user + spent.system
     return sum(times) - times.idle - times.iowait, own
+
+
+def wait_for_quiet(end: float) -> None:
+    """Return when other programs leave the processors alone for a while, or when time is up."""
+    while time.monotonic() < end:
+        all_before, own_before = processor_seconds()
+        time.sleep(SECONDS_OF_QUIET)
+        all_after, own_after = processor_seconds()
+        others = (all_after - all_before) - (own_after - own_before)
+        if others < MOST_BY_OTHERS * SECONDS_OF_QUIET * len(os.sched_getaffinity(0)):
+            return
 
 
 def timed(work: list[Unit], address: str) -> tuple[float, float, bytes]:
@@ -84,6 +96,7 @@ def main() -> None:
     quiet: list[float] = []
     bits = set()
     while len(quiet) < turns and time.monotonic() < end:
+        wait_for_quiet(end)
         (one, busy_one, found_one), (two, busy_two, found_two) = (
             timed(work, clusters[count].scheduler_address) for count in (1, 2)
         )
@@ -91,9 +104,10 @@ def main() -> None:
         counts = max(busy_one, busy_two) < MOST_BY_OTHERS
         if counts:
             quiet.append(one / two)
+        others = f"others took {100 * busy_one:.0f} and {100 * busy_two:.0f} % of the processors"
         print(
-            f"1 worker {one:.2f} s, 2 workers {two:.2f} s: {one / two:.2f} times as fast; others took "
-            f"{100 * busy_one:.0f} and {100 * busy_two:.0f} % of the processors{'' if counts else ': not counted'}",
+            f"1 worker {one:.2f} s, 2 workers {two:.2f} s: {one / two:.2f} times as fast; "
+            f"{others}{'' if counts else ': not counted'}",
             flush=True,
         )
     print(f"equal bits: {len(bits) == 1}")
