@@ -3,7 +3,9 @@
 A local Dask cluster with one worker process and one with two, the same 24 scenes, in turns. Each turn
 gives one ratio of wall times. A turn starts when other programs are quiet; one during which they took a tenth
 of the processors or more is shown and not counted. Turns go on until enough are counted or the minutes are
-over. The bits of all runs are compared.
+over. Beside it stands the ratio of the processor time of the busiest worker, which other programs hardly
+touch: what the wall time comes to when nothing else runs and workers never wait. The bits of all runs are
+compared.
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
@@ -26,6 +29,15 @@ PACKETS = 4e5
 TURNS = 3
 MOST_BY_OTHERS = 0.1
 SECONDS_OF_QUIET = 1.5
+
+
+class Timed(NamedTuple):
+    """Wall seconds, processor seconds of the busiest worker, others' share of the processors, bits."""
+
+    seconds: float
+    busiest: float
+    others: float
+    bits: bytes
 
 
 def units() -> list[Unit]:
@@ -65,18 +77,28 @@ def wait_for_quiet(end: float) -> None:
             return
 
 
-def timed(work: list[Unit], address: str) -> tuple[float, float, bytes]:
-    """Return seconds, the share of the processors that others took meanwhile, and the bits."""
+def workers_seconds(cluster: Any) -> list[float]:
+    """Seconds of processor time that each worker process has spent."""
+    import psutil
+
+    spent = [psutil.Process(worker.pid).cpu_times() for worker in cluster.workers.values()]
+    return [times.user + times.system for times in spent]
+
+
+def timed(work: list[Unit], cluster: Any) -> Timed:
+    """Run the sweep once."""
     with tempfile.TemporaryDirectory() as folder:
         all_before, own_before = processor_seconds()
+        workers_before = workers_seconds(cluster)
         start = time.perf_counter()
-        outcome = run(work, folder, dask=address)
+        outcome = run(work, folder, dask=cluster.scheduler_address)
         seconds = time.perf_counter() - start
+        busiest = max(np.subtract(workers_seconds(cluster), workers_before))
         all_after, own_after = processor_seconds()
         assert len(outcome.records) == len(work), outcome.failures
         others = (all_after - all_before) - (own_after - own_before)
         share = max(0.0, others) / (seconds * len(os.sched_getaffinity(0)))
-        return seconds, share, energies(Path(folder), work)
+        return Timed(seconds, float(busiest), share, energies(Path(folder), work))
 
 
 def main() -> None:
@@ -94,25 +116,28 @@ def main() -> None:
             client.run(lambda unit: unit.perform(1).total, work[0])
         assert len(cluster.workers) == count
     quiet: list[float] = []
+    busiest: list[float] = []
     bits = set()
     while len(quiet) < turns and time.monotonic() < end:
         wait_for_quiet(end)
-        (one, busy_one, found_one), (two, busy_two, found_two) = (
-            timed(work, clusters[count].scheduler_address) for count in (1, 2)
-        )
-        bits |= {found_one, found_two}
-        counts = max(busy_one, busy_two) < MOST_BY_OTHERS
+        one, two = (timed(work, clusters[count]) for count in (1, 2))
+        bits |= {one.bits, two.bits}
+        busiest.append(one.busiest / two.busiest)
+        counts = max(one.others, two.others) < MOST_BY_OTHERS
         if counts:
-            quiet.append(one / two)
-        others = f"others took {100 * busy_one:.0f} and {100 * busy_two:.0f} % of the processors"
+            quiet.append(one.seconds / two.seconds)
         print(
-            f"1 worker {one:.2f} s, 2 workers {two:.2f} s: {one / two:.2f} times as fast; "
-            f"{others}{'' if counts else ': not counted'}",
+            f"1 worker {one.seconds:.2f} s, 2 workers {two.seconds:.2f} s: "
+            f"{one.seconds / two.seconds:.2f} times as fast; busiest worker {one.busiest:.2f} and "
+            f"{two.busiest:.2f} s; others took {100 * one.others:.0f} and {100 * two.others:.0f} % of the "
+            f"processors{'' if counts else ': not counted'}",
             flush=True,
         )
     print(f"equal bits: {len(bits) == 1}")
     if quiet:
         print(f"median of {len(quiet)} quiet turns: {statistics.median(quiet):.2f} times as fast")
+    if busiest:
+        print(f"by the busiest worker, median of {len(busiest)}: {statistics.median(busiest):.2f} times")
     for cluster in clusters.values():
         cluster.close()
 
