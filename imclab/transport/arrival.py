@@ -1,8 +1,8 @@
 """What a picture with hardly any light should tell: a gate beside the target's return, or no photon at all.
 
 The pulse has no end: a gate that opens long after the target's light still gets the share of a
-Gaussian's tail, 1e-39 J or less, and of light that took long detours. Such a number stays what it is,
-because the estimators are held against one another there, but it is told what it means.
+Gaussian's tail, and light that took long detours. Such a number stays what it is, because estimators are
+held against one another there, but it is told what it means.
 """
 
 from __future__ import annotations
