@@ -88,6 +88,12 @@ class Result:
         """Relative standard error of the total; infinite when nothing arrived."""
         return self.total_stderr / self.total if self.total > 0 else float("inf")
 
+    @property
+    def pixel_error(self) -> float:
+        """Relative standard error of the median pixel; infinite when nothing arrived."""
+        lit = self.energy > 0.0
+        return float(np.median(self.energy_stderr[lit] / self.energy[lit])) if lit.any() else float("inf")
+
     def save(self, path: str | Path) -> None:
         """Write the result as one HDF5 file, whole or not at all."""
         import h5py

@@ -31,10 +31,10 @@ def emit(data: Mapping[str, Any], text: str, *, as_json: bool) -> None:
     print(json.dumps(jsonable(data), indent=2) if as_json else text)
 
 
-def told(reached: Any) -> str:
+def told(reached: Any, *, of: str = "the result") -> str:
     """Put into words what a run's progress callback is told (`imclab.transport.runner.Reached`)."""
     error = f"{100.0 * reached.rel_error:.3g} %" if math.isfinite(reached.rel_error) else "not known yet"
-    return f"relative error {error} after {reached.packets:.3g} packets and {reached.seconds:.1f} s"
+    return f"relative error of {of} {error} after {reached.packets:.3g} packets and {reached.seconds:.1f} s"
 
 
 class Progress:

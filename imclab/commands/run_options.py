@@ -43,6 +43,14 @@ RelError = Annotated[
     float | None,
     typer.Option("--rel-error", callback=between_0_and_1, help="Stop at this relative error: 0.02 is 2 %."),
 ]
+PixelError = Annotated[
+    float | None,
+    typer.Option(
+        "--pixel-error",
+        callback=between_0_and_1,
+        help="Stop when the median pixel has this relative error; instead of --rel-error.",
+    ),
+]
 Seconds = Annotated[
     float | None,
     typer.Option("--seconds", callback=_above_0, help="Stop after so long; compiling does not count."),

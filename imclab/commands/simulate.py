@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from imclab.commands.console import JSON_OPTION, Progress, emit, told
-from imclab.commands.run_options import Estimator, Packets, RelError, Seconds, Seed, Threads
+from imclab.commands.run_options import Estimator, Packets, PixelError, RelError, Seconds, Seed, Threads
 
 
 def simulate(
@@ -17,6 +17,7 @@ def simulate(
     rel_error: RelError = None,
     seconds: Seconds = None,
     packets: Packets = None,
+    pixel_error: PixelError = None,
     estimator: Estimator = None,
     seed: Seed = None,
     threads: Threads = None,
@@ -40,6 +41,7 @@ def simulate(
     check_output(output)
     loaded = imclab.load_scene(scene)
     progress = Progress()
+    of = "the total" if pixel_error is None else "the median pixel"
     for note in gate_beside_target(loaded, setup_of(loaded)):
         progress(f"Note: {note}.", final=True)
     try:
@@ -48,11 +50,12 @@ def simulate(
             rel_error=rel_error,
             seconds=seconds,
             packets=packets,
+            pixel_error=pixel_error,
             estimator=estimator,
             seed=seed,
             threads=threads,
             time_bins=DEFAULT_TIME_BINS if time_bins is None else time_bins,
-            progress=lambda reached: progress(told(reached)),
+            progress=lambda reached: progress(told(reached, of=of)),
         )
     finally:
         progress.close()
@@ -62,6 +65,7 @@ def simulate(
         "total": result.total,
         "total_stderr": result.total_stderr,
         "relative_error": result.relative_error,
+        "pixel_error": result.pixel_error,
         "target_total": result.target_total,
         "target_total_stderr": result.target_total_stderr,
         "backscatter_total": result.backscatter_total,

@@ -38,10 +38,10 @@ def _suitable(setup: Setup) -> tuple[str, str]:
         return "analog", "light scattered straight back (g = -1) cannot be joined with the beam, only met"
     kinds = {setup.target.figure.kind, setup.target.ground.kind}
     if kinds == {MICROFACET}:
-        return "two-sided", "backscatter from the camera's side, light of the glossy target from the laser's"
+        return "two-sided", "light of the glossy target and backscatter from the camera's side"
     if MICROFACET in kinds:
         return (
             "two-sided",
-            "a diffuse surface is lit and seen from both sides, the glossy one from the laser's",
+            "a diffuse surface is joined from both sides, the glossy one seen from the camera's",
         )
     return "two-sided", "a diffuse target is lit from the laser's side and seen from the camera's"

@@ -18,10 +18,19 @@ def limits(
     rel_error: float | None,
     seconds: float | None,
     packets: float | None,
+    pixel_error: float | None = None,
 ) -> Until:
-    """Return when to stop: as asked, else as the scene says, else at 1 % relative error."""
-    asked = {"rel_error": rel_error, "seconds": seconds, "packets": packets}
-    if all(value is None for value in asked.values()):
+    """Return when to stop: as asked, else as the scene says, else at 1 % relative error.
+
+    ``pixel_error`` takes the place of ``rel_error``: the error that stops the run is then that of pixels.
+    """
+    if pixel_error is not None and rel_error is not None:
+        wanted = "only one: the total's error or the median pixel's"
+        raise InputError("run", [Fault("pixel_error", f"{pixel_error} beside rel_error {rel_error}", wanted)])
+    error_name = "rel_error" if pixel_error is None else "pixel_error"
+    error = rel_error if pixel_error is None else pixel_error
+    asked = {error_name: error, "seconds": seconds, "packets": packets}
+    if all(value is None for value in asked.values()):  # then it is rel_error that was not asked for
         asked = {name: getattr(scene.run, name) for name in asked}
     if all(value is None for value in asked.values()):
         asked["rel_error"] = DEFAULT_REL_ERROR
@@ -30,16 +39,15 @@ def limits(
         for name, value in asked.items()
         if value is not None and not (math.isfinite(value) and value > 0)
     ]
-    if asked["rel_error"] is not None and not faults and asked["rel_error"] >= 1:
-        faults.append(
-            Fault("rel_error", f"{asked['rel_error']}", "a number above 0 and below 1: 0.02 is 2 %")
-        )
+    error = asked[error_name]
+    if error is not None and not faults and error >= 1:
+        faults.append(Fault(error_name, f"{error}", "a number above 0 and below 1: 0.02 is 2 %"))
     if asked["packets"] is not None and not faults and asked["packets"] < 1:
         faults.append(Fault("packets", f"{asked['packets']}", "at least 1"))
     if faults:
         raise InputError("run", faults)
     count = None if asked["packets"] is None else round(asked["packets"])
-    return Until(asked["rel_error"], asked["seconds"], count)
+    return Until(error, asked["seconds"], count)
 
 
 def seed_of(scene: Scene, seed: int | None) -> int:

@@ -98,10 +98,20 @@ class MeanLedger:
 
     With batch means m_i of n_i histories, sum n_i (m_i - m)^2 / (B - 1) estimates the variance of one
     history and the variance of the overall mean m is that over N (West 1979, CACM 22, 532).
+
+    Parameters
+    ----------
+    exact : mapping
+        What is computed per history, added to the means.
+    stop_at : str
+        Name of the quantity whose relative error stops a run.
+    median : bool
+        Whether it is the median of its parts that counts, such as the pixels of a picture, or the largest.
     """
 
-    def __init__(self, exact: Tally, *, stop_at: str) -> None:
+    def __init__(self, exact: Tally, *, stop_at: str, median: bool = False) -> None:
         self._stop_at = stop_at
+        self._median = median
         self.histories = 0
         self.batches = 0
         self._exact = dict(exact)
@@ -137,12 +147,15 @@ class MeanLedger:
         return np.sqrt(self._spreads[name] / ((self.batches - 1) * self.histories))
 
     def relative_error(self) -> float:
-        """Return the largest relative standard error of the quantity that stops a run."""
+        """Return the largest, or median, relative standard error of the quantity that stops a run."""
         if self.batches < 2:
             return np.inf
         mean, stderr = np.abs(self.mean(self._stop_at)), self.stderr(self._stop_at)
         known = mean > 0.0
-        return float(np.max(stderr[known] / mean[known])) if known.any() else np.inf
+        if not known.any():
+            return np.inf
+        relative = stderr[known] / mean[known]
+        return float(np.median(relative) if self._median else np.max(relative))
 
 
 def run(

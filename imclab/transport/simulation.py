@@ -30,6 +30,7 @@ def simulate(
     rel_error: float | None = None,
     seconds: float | None = None,
     packets: float | None = None,
+    pixel_error: float | None = None,
     seed: int | None = None,
     estimator: str | None = None,
     threads: int | None = None,
@@ -52,6 +53,8 @@ def simulate(
         Number of packets; their errors and the picture are then the same for any number of threads.
     seed : int, optional
         The random numbers follow from it and from nothing else.
+    pixel_error : float, optional
+        Wanted relative standard error of the median pixel, instead of ``rel_error``.
     estimator : {"auto", "analog", "expected", "two-sided"}, optional
         How to estimate; ``auto`` chooses by scene and says why in ``notes``.
     threads : int, optional
@@ -79,7 +82,7 @@ def simulate(
     from imclab.transport.setup import setup_of
     from imclab.transport.time_histogram import time_edges
 
-    until = limits(scene, rel_error=rel_error, seconds=seconds, packets=packets)
+    until = limits(scene, rel_error=rel_error, seconds=seconds, packets=packets, pixel_error=pixel_error)
     used_seed = seed_of(scene, seed)
     check_threads(threads)
     if not 0 <= time_bins <= MOST_TIME_BINS:
@@ -87,7 +90,8 @@ def simulate(
     setup = setup_of(scene, time_bins=time_bins)
     edges = time_edges(scene, setup, time_bins) if time_bins else None
     chosen = _with_totals(choose(estimator or scene.run.estimator, setup), scene, setup, edges)
-    ledger = MeanLedger(chosen.exact, stop_at="total")
+    of_pixels = pixel_error is not None
+    ledger = MeanLedger(chosen.exact, stop_at="energy" if of_pixels else "total", median=of_pixels)
     effort = run(chosen, ledger, until, seed=used_seed, threads=threads, progress=progress)
     joules = scene.laser.pulse_energy
     parts: dict[str, Any] = {}

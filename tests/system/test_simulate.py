@@ -129,3 +129,17 @@ def test_ctrl_c_saves_what_was_finished(tmp_path: Path) -> None:
     assert result.interrupted
     assert result.packets > 0
     assert "Traceback" not in rest
+
+
+def test_a_run_stops_at_the_error_of_the_median_pixel(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The total's error is far smaller; asking for both at once is refused."""
+    command = ["simulate", str(SLIT), "-o", str(tmp_path / "r.h5"), "--pixel-error", "0.004", "--json"]
+    assert run(command) == 0
+    summary = told(capsys)
+    assert summary["pixel_error"] <= 0.004
+    assert summary["relative_error"] < 0.2 * summary["pixel_error"]
+    assert summary["pixel_error"] == Result.load(tmp_path / "r.h5").pixel_error
+    assert run([*command, "--rel-error", "0.01"]) == 2
+    assert "only one" in capsys.readouterr().err

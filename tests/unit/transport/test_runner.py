@@ -148,3 +148,15 @@ def test_jackknife_errors_cover_a_quotient() -> None:
         errors.append(stderr[0])
     assert 0.6 < judging.coverage(quotients, errors, 0.5) < 0.76
     assert judging.coverage(quotients, errors, 0.51) < 0.5
+
+
+def test_the_median_part_may_stop_a_run() -> None:
+    """One noisy pixel rules the largest error and leaves the median alone."""
+    ledgers = [MeanLedger({}, stop_at="picture", median=median) for median in (False, True)]
+    draws = np.random.default_rng(1).normal([1.0, 1.0, 1.0], [0.01, 0.02, 3.0], (400, 3))
+    for row in draws:
+        for ledger in ledgers:
+            ledger.enter({"picture": row}, 1)
+    largest, median = (ledger.relative_error() for ledger in ledgers)
+    assert median == pytest.approx(0.02 / 20.0, rel=0.2)
+    assert largest > 50.0 * median
