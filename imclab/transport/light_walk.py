@@ -30,7 +30,7 @@ FloatArray = NDArray[np.float64]
 LIGHT_STREAM = 11
 ROULETTE_WEIGHT = 0.02
 ROULETTE_CHANCE = 0.2
-REFLECTED_FIRST = 0.1
+REFLECTED_FIRST = 0.2
 """Share of walks that begin on the target, with light that has reached it unscattered."""
 NEAREST = 1e-3
 """Shortest flight from the target that is drawn more often than it happens, in half sides of the target."""
@@ -139,6 +139,24 @@ def ring_of(radii: Any, radius: Any) -> Any:
 
 
 @device
+def _score_late(setup: Any, axes: Any, maps: Any, place: Any, energy: Any, time: Any) -> None:
+    """Part light between the four nodes around a place of the target, gated for each camera time."""
+    target, cells = setup.target, axes.cells
+    down = (place[1] / target.half_height + 1.0) * 0.5 * cells
+    across = (place[0] / target.half_width + 1.0) * 0.5 * cells
+    row, column = min(int(down), cells - 1), min(int(across), cells - 1)
+    cell = 4.0 * target.half_width * target.half_height / (cells * cells)
+    for n in range(axes.times.shape[0]):
+        share = gate_share(setup.gate, time + axes.times[n]) / cell
+        for corner in range(4):
+            y, x = row + corner // 2, column + corner % 2
+            part = share * (1.0 - abs(down - y)) * (1.0 - abs(across - x))
+            part *= (2.0 if y in (0, cells) else 1.0) * (2.0 if x in (0, cells) else 1.0)  # half a tent
+            maps.late[0, n, y, x] += energy[0] * part
+            maps.late[1, n, y, x] += energy[1] * part
+
+
+@device
 def score(setup: Any, axes: Any, maps: Any, touched: bool, place: Any, energy: Any, time: Any) -> None:
     """Enter light that lands at a place (x, y) of the target's plane at a time into the maps."""
     target = setup.target
@@ -148,13 +166,7 @@ def score(setup: Any, axes: Any, maps: Any, touched: bool, place: Any, energy: A
     if radius >= axes.radii[-1] or (touched and not inside):
         return
     if touched:
-        row = int((y / target.half_height + 1.0) * 0.5 * axes.cells)
-        column = int((x / target.half_width + 1.0) * 0.5 * axes.cells)
-        cell = 4.0 * target.half_width * target.half_height / (axes.cells * axes.cells)
-        for n in range(axes.times.shape[0]):
-            share = gate_share(setup.gate, time + axes.times[n]) / cell
-            maps.late[0, n, row, column] += energy[0] * share
-            maps.late[1, n, row, column] += energy[1] * share
+        _score_late(setup, axes, maps, place, energy, time)
     impulses = maps.late_impulses if touched else maps.impulses
     ring, outer = ring_of(axes.radii, radius)
     inner_area, outer_area = (1.0 - outer) / axes.ring_areas[ring], outer / axes.ring_areas[ring + 1]
@@ -176,7 +188,7 @@ def empty_maps(axes: Any) -> Any:
     return LightMaps(
         np.zeros((2, bins, rings)),
         np.zeros((2, bins, rings)),
-        np.zeros((2, axes.times.shape[0], axes.cells, axes.cells)),
+        np.zeros((2, axes.times.shape[0], axes.cells + 1, axes.cells + 1)),
     )
 
 

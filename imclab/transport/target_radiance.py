@@ -21,7 +21,8 @@ STEPS_PER_SIGMA = 24.0
 TABLE_STEPS_PER_SIGMA = 64.0
 RINGS_PER_BEAM = 48.0
 RING_GROWTH = 0.03
-COARSE_CELLS = 24
+COARSE_CELLS = 8
+"""Cells along each side of the map of light that comes back, faint and smooth: linear between nodes."""
 MOST_IMPULSE_BINS = 2000
 
 
@@ -135,16 +136,8 @@ def _times_last(table: Any) -> Any:
 
 
 @device
-def _add(line: Any, table: Any, place: Any, amount: Any) -> None:
-    """Add ``amount`` times the values of a table (places · times) at a place to a line of times."""
-    here, part = np.uint64(place * line.shape[0]), np.float32(amount)
-    for n in range(np.uint64(line.shape[0])):
-        line[n] += part * table[here + n]
-
-
-@device
 def _add_between(line: Any, table: Any, place: Any, amount: Any) -> None:
-    """Do what `_add` does, interpolating linearly between the places around ``place``."""
+    """Add ``amount`` times a table (places · line's length) to a line, linear between places."""
     inner = int(place)
     times, outer, part = line.shape[0], np.float32(place - inner), np.float32(amount)
     here, beyond = np.uint64(inner * times), np.uint64((inner + 1) * times)
@@ -158,7 +151,7 @@ def gated_radiance(
 ) -> Any:
     """Return the gated radiance (rows, times, columns), float32, and the picture of scattered light.
 
-    ``table`` is that of `gate_table`; ``rings`` (2, times, rings) and ``late`` (2, times, cells, cells)
+    ``table`` is that of `gate_table`; ``rings`` (2, times, rings) and ``late`` (2, times, nodes, nodes)
     are the gated light on the target per packet; the picture is of light scattered on its way to the
     target and seen unscattered. All tables are turned so that times stand side by side: that loop
     vectorises (2 times as fast as one over columns, which has to gather).
@@ -168,13 +161,18 @@ def gated_radiance(
     start, step, shares = table
     radiance = np.empty((rows, times, columns), dtype=np.float32)
     picture = np.zeros((rows, columns))
-    by_ring, by_cell = _times_last(rings), _times_last(late.reshape(2, times, axes.cells * axes.cells))
+    side = axes.cells + 1
+    by_ring, by_node = _times_last(rings), _times_last(late.reshape(2, times, side * side))
+    returned = np.empty((2, side * times), dtype=np.float32)
     gate = shares.ravel()
     touched = late.any()
     line = np.empty(times, dtype=np.float32)
     for row in range(rows):
         y = (2.0 * (row + 0.5) / rows - 1.0) * target.half_height
-        coarse_row = int((row + 0.5) / rows * axes.cells)
+        down = (row + 0.5) / rows * axes.cells
+        for material in range(2):
+            returned[material] = 0.0
+            _add_between(returned[material], by_node[material], down, 1.0)
         for column in range(columns):
             x = (2.0 * (column + 0.5) / columns - 1.0) * target.half_width
             ring, outer = ring_of(axes.radii, math.sqrt(x * x + y * y))
@@ -184,9 +182,9 @@ def gated_radiance(
             _add_between(line, by_ring[0], ring + outer, figure)
             _add_between(line, by_ring[1], ring + outer, ground)
             if touched:
-                cell = coarse_row * axes.cells + int((column + 0.5) / columns * axes.cells)
-                _add(line, by_cell[0], cell, figure)
-                _add(line, by_cell[1], cell, ground)
+                across = (column + 0.5) / columns * axes.cells
+                _add_between(line, returned[0], across, figure)
+                _add_between(line, returned[1], across, ground)
             for n in range(nodes):
                 picture[row, column] += direct.reach[row, column, n] * line[n]
             straight = figure * direct.lit[0, row, column] + ground * direct.lit[1, row, column]
