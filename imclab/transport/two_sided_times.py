@@ -21,7 +21,7 @@ def scattered_times(setup: Setup, axes: MapAxes, arriving: FloatArray, seen: Flo
     # numpy's transforms: scipy.signal would do the same, but loading it takes as long as half a cached start
     length = arriving.shape[1] + seen.shape[1] - 1
     spectrum = np.fft.rfft(arriving, length, axis=1) * np.fft.rfft(seen, length, axis=1)
-    both = np.fft.irfft(spectrum.sum(axis=(0, 2)), length)
+    both = np.maximum(np.fft.irfft(spectrum.sum(axis=(0, 2)), length), 0.0)  # rounding may go below
     moment = axes.impulse_start + axes.times[0] + np.arange(both.size) * axes.impulse_width
     place = (moment - setup.time.start) / setup.time.width - 0.5
     place = np.clip(place, -2.0, setup.time.bins + 1.0)  # an early gate lies far from all light
