@@ -1,7 +1,8 @@
 """Errors of the scenes with a mirror: ``python -m tests.figures.glossy [PACKETS]``.
 
-For each shipped scene with a glossy figure, at optical depths 0.42 and 1.42: figure of merit of the total,
-1/(relative variance x CPU seconds), and relative errors of pixels on the figure and on the ground. One thread.
+For each shipped scene with a glossy figure, at optical depths 0.42 and 1.42: figure of merit of the
+total, 1/(relative variance x CPU seconds), and stated relative errors of pixels on the figure and on the
+ground. One thread.
 """
 
 from __future__ import annotations

@@ -109,7 +109,8 @@ def test_late_light_of_a_large_target_is_kept() -> None:
 def test_light_beside_a_mirror_agrees_pixel_by_pixel() -> None:
     """A silver slit in diffuse ground: next events from the laser's side meet walks from the camera's side.
 
-    Without the mirror's veil the ground would lose most of its light; 10 % more or less light in all is told apart.
+    Without the mirror's veil the ground would lose most of its light; 10 % more or less light in all is told
+    apart.
     """
     changes = {
         "medium.attenuation": "1.42 1/m",
