@@ -21,6 +21,9 @@ from imclab.transport.setup import Setup
 FloatArray = NDArray[np.float64]
 
 _GAUSS_2 = 0.5 / math.sqrt(3.0)
+MOST_PARTS = 64
+BEAM_REACH = 7.0
+"""Standard deviations of the beam beyond which its light is nothing: cells there are not cut."""
 
 
 class Rules(NamedTuple):
@@ -96,11 +99,22 @@ def nodes_reached(setup: Setup, times: FloatArray) -> int:
     return min(int(np.searchsorted(times, longest)) + 1, times.size)
 
 
+def finer(setup: Setup, shape: tuple[int, int]) -> int:
+    """Return into how many parts along each side cells in the beam are cut: two to a standard deviation."""
+    beam, target = setup.beam, setup.target
+    width = math.hypot(beam.spot_sigma, target.distance * beam.divergence_sigma)
+    cell = max(2.0 * target.half_height / shape[0], 2.0 * target.half_width / shape[1])
+    return min(max(math.ceil(2.0 * cell / max(width, 1e-12)), 1), MOST_PARTS)
+
+
 @cached_kernel
-def direct_light(setup: Any, rules: Rules, coverage: Any, times_back: Any, nodes: int) -> DirectLight:
+def direct_light(
+    setup: Any, rules: Rules, coverage: Any, times_back: Any, nodes: int, parts: int
+) -> DirectLight:
     """Compute the unscattered light for a grid of cells over the target, of which a share is figure.
 
-    ``times_back`` are the nodes of camera time (see `MapAxes`), ``nodes`` how many of them are needed.
+    ``times_back`` are the nodes of camera time (see `MapAxes`), ``nodes`` how many of them are needed,
+    ``parts`` is that of `finer`.
     """
     rows, columns = coverage.shape
     lit = np.zeros((2, rows, columns))
@@ -109,22 +123,33 @@ def direct_light(setup: Any, rules: Rules, coverage: Any, times_back: Any, nodes
     times = np.zeros(setup.time.bins)
     target = setup.target
     cell = 4.0 * target.half_width * target.half_height / (rows * columns)
+    width = math.hypot(setup.beam.spot_sigma, target.distance * setup.beam.divergence_sigma)
+    in_beam = BEAM_REACH * width + math.hypot(
+        2.0 * target.half_width / columns, 2.0 * target.half_height / rows
+    )
     for row in range(rows):
         for column in range(columns):
-            for corner in range(4):
-                inside_x = 0.5 + _GAUSS_2 * (2 * (corner % 2) - 1)
-                inside_y = 0.5 + _GAUSS_2 * (2 * (corner // 2) - 1)
+            middle_x = (2.0 * (column + 0.5) / columns - 1.0) * target.half_width
+            middle_y = (2.0 * (row + 0.5) / rows - 1.0) * target.half_height
+            cut = parts if math.hypot(middle_x, middle_y) < in_beam else 1
+            share = 0.25 / (cut * cut)
+            for corner in range(4 * cut * cut):
+                part, quarter = corner // 4, corner % 4
+                inside_x = (part % cut + 0.5 + _GAUSS_2 * (2 * (quarter % 2) - 1)) / cut
+                inside_y = (part // cut + 0.5 + _GAUSS_2 * (2 * (quarter // 2) - 1)) / cut
                 x = (2.0 * (column + inside_x) / columns - 1.0) * target.half_width
                 y = (2.0 * (row + inside_y) / rows - 1.0) * target.half_height
                 figure, ground, arrival = _irradiance(setup, rules, x, y)
-                lit[0, row, column] += 0.25 * figure
-                lit[1, row, column] += 0.25 * ground
-                time[row, column] += 0.25 * arrival
-                parts = reach[row, column]
-                seen, back, gated = _gathered(setup, rules, (x, y), arrival, times_back, 0.25 * cell, parts)
-                return_time[row, column] += 0.25 * back
+                lit[0, row, column] += share * figure
+                lit[1, row, column] += share * ground
+                time[row, column] += share * arrival
+                by_time = reach[row, column]
+                seen, back, gated = _gathered(
+                    setup, rules, (x, y), arrival, times_back, share * cell, by_time
+                )
+                return_time[row, column] += share * back
                 radiance = ground + coverage[row, column] * (figure - ground)
-                radiance *= 0.25 * cell / math.pi
+                radiance *= share * cell / math.pi
                 picture[row, column] += radiance * gated
                 bin_ = time_bin(setup.time, arrival + back)
                 if bin_ >= 0:

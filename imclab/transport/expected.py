@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from imclab.optics.surface import MICROFACET
 from imclab.transport.backscatter_walk import backscatter_walks, way_home
-from imclab.transport.direct_light import coverage_of, direct_light, rules_for
-from imclab.transport.next_event import mirror_light, next_event_walks
+from imclab.transport.direct_light import coverage_of, direct_light, finer, rules_for
+from imclab.transport.next_event import DIFFUSE_LAST, mirror_light, next_event_walks
 from imclab.transport.picture_grid import PictureGrid, picture_grid
 from imclab.transport.runner import Estimator, Tally
 from imclab.transport.setup import PULSE_REACH, Setup, first_return
@@ -28,7 +28,7 @@ def make(setup: Setup) -> Estimator:
     """Return the expected estimator of a set-up."""
     grid = picture_grid(setup)
     coverage = coverage_of(setup.target.mask, *grid.cells)
-    direct = direct_light(setup, rules_for(setup), coverage, np.zeros(1), 1)
+    direct = direct_light(setup, rules_for(setup), coverage, np.zeros(1), 1, finer(setup, grid.cells))
     exact = {"target": grid.pixels(direct.picture), "backscatter": np.zeros(grid.shape)}
     if setup.time.bins:
         exact["time"] = direct.times
@@ -41,7 +41,7 @@ def make(setup: Setup) -> Estimator:
         backscatter = np.zeros(veil.shape)
         run = (np.uint64(seed), np.uint64(first_history), count)
         if scatters:
-            next_event_walks(setup, latest, *run, target, times)
+            next_event_walks(setup, DIFFUSE_LAST, latest, *run, target, times)
             backscatter_walks(setup, home, latest, veil.tents, *run, backscatter, times)
         if glossy.size:
             mirror_light(setup, glossy, *run, target, times)

@@ -34,10 +34,11 @@ MIRRORED_HISTORIES = np.uint64(1 << 62)
 """Added to the numbers of the walks that meet the target first, so that no two walks share random numbers."""
 
 
-def largest_roughness(setup: Setup) -> float:
-    """Return the largest roughness of the target's glossy surfaces, 0 without any."""
+def roughnesses(setup: Setup) -> tuple[float, float]:
+    """Return the roughness of figure and ground; of the one that is glossy, twice, where the other is not."""
     surfaces = (setup.target.figure, setup.target.ground)
-    return max(surface.roughness if surface.kind == MICROFACET else 0.0 for surface in surfaces)
+    glossy = [surface.roughness for surface in surfaces if surface.kind == MICROFACET]
+    return (glossy[0], glossy[-1]) if glossy else (0.0, 0.0)
 
 
 @device
@@ -162,7 +163,7 @@ def _follow(setup: Any, way_of: Any, numbers: Any, even: Any, start: Any, pictur
 @cached_kernel
 def glossy_walks(
     setup: Any,
-    roughness: float,
+    roughness: Any,
     peak: float,
     latest: float,
     seed: Any,
@@ -173,7 +174,7 @@ def glossy_walks(
 ) -> None:
     """Add ``count`` walks that the water scatters on the way from camera to target, all pixels alike.
 
-    ``roughness`` is that of `largest_roughness`, ``peak`` that of `way_home`; ``picture`` and the impulse
+    ``roughness`` is that of `roughnesses`, ``peak`` that of `way_home`; ``picture`` and the impulse
     ``times`` are sums over walks.
     """
     water, target = setup.water, setup.target
@@ -198,7 +199,7 @@ def glossy_walks(
 def mirrored_walks(
     setup: Any,
     cells: Any,
-    roughness: float,
+    roughness: Any,
     peak: float,
     latest: float,
     seed: Any,

@@ -46,6 +46,8 @@ class MapAxes(NamedTuple):
         Radii of the tent functions of the ring map, m; the first is 0.
     ring_areas : array (rings)
         Integral of each tent function over the plane, m².
+    inner_areas : array (rings)
+        Its integral over the target's rectangle alone, m².
     times : array (times)
         Camera times, s; a single one when there is no gate.
     cells : int
@@ -56,6 +58,7 @@ class MapAxes(NamedTuple):
 
     radii: FloatArray
     ring_areas: FloatArray
+    inner_areas: FloatArray
     times: FloatArray
     cells: int
     impulse_start: float
@@ -169,7 +172,8 @@ def score(setup: Any, axes: Any, maps: Any, touched: bool, place: Any, energy: A
         _score_late(setup, axes, maps, place, energy, time)
     impulses = maps.late_impulses if touched else maps.impulses
     ring, outer = ring_of(axes.radii, radius)
-    inner_area, outer_area = (1.0 - outer) / axes.ring_areas[ring], outer / axes.ring_areas[ring + 1]
+    areas = axes.inner_areas if touched else axes.ring_areas
+    inner_area, outer_area = (1.0 - outer) / areas[ring], outer / areas[ring + 1]
     moment = min((time - axes.impulse_start) / axes.impulse_width, axes.impulse_bins - 1.000001)
     bin_ = int(max(moment, 0.0))
     later = moment - bin_

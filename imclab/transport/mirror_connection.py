@@ -5,8 +5,8 @@ the place where the line from y to the image of the laser, behind the target at 
 the target. To first order in the slopes of facets it spreads there as a normal law of
 σ = √2 α d₁ d₂/(d₁ + d₂), with α the roughness, d₁ the distance from laser to target, d₂ that from y to the
 target. Places are drawn from a law with heavier tails, q(δ) = 1/(π w² (1 + δ²/w²)²) with w² = 3 σ², which is
-nowhere less than 0.6 of the normal law, and for rough or slanting surfaces also evenly over the target; the
-mean of both densities is divided by (balance heuristic, Veach 1997, section 9.2).
+nowhere less than 0.6 of the normal law, for each roughness that the target has, and evenly over the target;
+the mean of the densities is divided by (balance heuristic, Veach 1997, section 9.2).
 """
 
 from __future__ import annotations
@@ -33,17 +33,20 @@ def _place_on_target(setup: Any, point: Any, roughness: Any, draws: Any) -> Any:
     toward = far / (near + far)
     middle = (point[0] * toward, point[1] * toward)
     spread = near / (near + far)
-    width = 3.0 * ((math.sqrt(2.0) * roughness * far * spread) ** 2 + (spot * spread) ** 2)
+    first = 3.0 * ((math.sqrt(2.0) * roughness[0] * far * spread) ** 2 + (spot * spread) ** 2)
+    second = 3.0 * ((math.sqrt(2.0) * roughness[1] * far * spread) ** 2 + (spot * spread) ** 2)
     if u_choice < EVENLY:
         x = (2.0 * u_size - 1.0) * target.half_width
         y = (2.0 * u_angle - 1.0) * target.half_height
     else:
+        width = first if u_choice < 0.5 * (1.0 + EVENLY) else second
         offset, angle = math.sqrt(width * u_size / (1.0 - u_size)), 2.0 * math.pi * u_angle
         x, y = middle[0] + offset * math.cos(angle), middle[1] + offset * math.sin(angle)
     inside = abs(x) < target.half_width and abs(y) < target.half_height
     square = (x - middle[0]) ** 2 + (y - middle[1]) ** 2
-    density = (1.0 - EVENLY) / (math.pi * width * (1.0 + square / width) ** 2)
-    density += EVENLY / (4.0 * target.half_width * target.half_height)
+    density = 0.5 / (math.pi * first * (1.0 + square / first) ** 2)
+    density += 0.5 / (math.pi * second * (1.0 + square / second) ** 2)
+    density = (1.0 - EVENLY) * density + EVENLY / (4.0 * target.half_width * target.half_height)
     return (x, y), density if inside else 0.0
 
 
@@ -56,8 +59,8 @@ def connect(setup: Any, point: Any, roughness: Any, draws: Any) -> Any:
     setup : Setup
     point : (x, y, z)
         In the water, m.
-    roughness : float
-        The largest of the target's glossy surfaces.
+    roughness : (float, float)
+        Those of the target's glossy surfaces, see `glossy_walk.roughnesses`.
     draws : five numbers in (0, 1)
         Three for the place on the target, two for the start in the laser's spot.
 

@@ -62,30 +62,36 @@ def _seen(setup: Any, toward: Any, sight: Any) -> Any:
 
 @device
 def _into_one_pixel(
-    setup: Any, picture: Any, point: Any, toward: Any, lit: Any, beyond: Any, draws: Any
-) -> Any:
-    """Add what the aperture gathers, seen from one of its points, drawn evenly; return the energy."""
-    receiver = setup.receiver
+    setup: Any, tally: Any, point: Any, toward: Any, lit: Any, beyond: Any, draws: Any
+) -> None:
+    """Add what the aperture gathers, seen from one of its points, drawn evenly.
+
+    ``tally`` is (picture, times).
+    """
+    receiver, (picture, times) = setup.receiver, tally
     radius, angle = receiver.radius * math.sqrt(draws[0]), 2.0 * math.pi * draws[1]
     x, y = receiver.x + radius * math.cos(angle), receiver.y + radius * math.sin(angle)
     sight = (point[0] - x, point[1] - y, point[2] - receiver.z)
     wider = (setup.target.distance - receiver.z) / sight[2]
     row, column = pixel_at(setup, x + wider * sight[0], y + wider * sight[1])
     if row < 0:
-        return 0.0
+        return
     seen, way = _seen(setup, toward, sight)
     energy = lit * seen * math.pi * (receiver.radius / sight[2]) ** 2
-    picture[row, column] += energy * gate_share(setup.gate, (beyond + way) / setup.water.group_velocity)
-    return energy
+    arrival = (beyond + way) / setup.water.group_velocity
+    picture[row, column] += energy * gate_share(setup.gate, arrival)
+    bin_ = time_bin(setup.time, arrival)
+    if bin_ >= 0:
+        times[bin_] += energy
 
 
 @device
-def _into_disc(setup: Any, picture: Any, point: Any, toward: Any, lit: Any, beyond: Any, inside: Any) -> Any:
-    """Add what the aperture gathers to all pixels that see the point; return the energy before the gate.
+def _into_disc(setup: Any, tally: Any, point: Any, toward: Any, lit: Any, beyond: Any, inside: Any) -> None:
+    """Add what the aperture gathers to all pixels that see the point.
 
-    ``inside`` is the place in a pixel that is looked at.
+    ``tally`` is (picture, times), ``inside`` the place in a pixel that is looked at.
     """
-    target, receiver = setup.target, setup.receiver
+    target, receiver, (picture, times) = setup.target, setup.receiver, tally
     rows, columns = picture.shape
     pitch_x, pitch_y = 2.0 * target.half_width / columns, 2.0 * target.half_height / rows
     off_x, off_y, depth = point[0] - receiver.x, point[1] - receiver.y, point[2] - receiver.z
@@ -96,7 +102,6 @@ def _into_disc(setup: Any, picture: Any, point: Any, toward: Any, lit: Any, beyo
     nearest = math.hypot(max(across - receiver.radius, 0.0), depth)
     share, slope = _shares(setup, nearest, math.hypot(across + receiver.radius, depth), beyond)
     each = lit * pitch_x * pitch_y / (wider * depth) ** 2
-    gathered = 0.0
     top, bottom = span(middle_y, radius, target.half_height, pitch_y, inside[1])
     for row in range(top, bottom):
         height = (row + inside[1]) * pitch_y - target.half_height - middle_y
@@ -105,22 +110,24 @@ def _into_disc(setup: Any, picture: Any, point: Any, toward: Any, lit: Any, beyo
         for column in range(left, end):
             off = (column + inside[0]) * pitch_x - target.half_width - middle_x
             seen, way = _seen(setup, toward, (off_x + off / wider, off_y + height / wider, depth))
-            gathered += each * seen
             picture[row, column] += each * seen * (share + slope * (way - nearest))
-    return gathered
+            if setup.time.bins > 0:
+                bin_ = time_bin(setup.time, (beyond + way) / setup.water.group_velocity)
+                if bin_ >= 0:
+                    times[bin_] += each * seen
 
 
 @cached_kernel
 def mirror_veil(
-    setup: Any, roughness: float, latest: float, seed: Any, first: Any, count: int, picture: Any, times: Any
+    setup: Any, roughness: Any, latest: float, seed: Any, first: Any, count: int, picture: Any, times: Any
 ) -> None:
     """Add the veil from ``count`` places in the water to the picture and to the impulse time bins.
 
     Parameters
     ----------
     setup : Setup
-    roughness : float
-        The largest of the target's glossy surfaces.
+    roughness : (float, float)
+        That of `glossy_walk.roughnesses`.
     latest : float
         When the gate has closed, s.
     seed, first, count
@@ -151,11 +158,8 @@ def mirror_veil(
         if irradiance == 0.0 or beyond + depth > latest * water.group_velocity:
             continue
         lit = irradiance * water.scattering * length * 4.0 * wide * high
-        places = (u_first, u_second)
+        places, tally = (u_first, u_second), (picture, times)
         if receiver.radius * (length / depth - 1.0) > SMALLEST_DISC * pitch:
-            gathered = _into_disc(setup, picture, point, toward, lit, beyond, places)
+            _into_disc(setup, tally, point, toward, lit, beyond, places)
         else:
-            gathered = _into_one_pixel(setup, picture, point, toward, lit, beyond, places)
-        bin_ = time_bin(setup.time, (beyond + depth) / water.group_velocity)
-        if bin_ >= 0:
-            times[bin_] += gathered
+            _into_one_pixel(setup, tally, point, toward, lit, beyond, places)

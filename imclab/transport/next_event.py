@@ -31,7 +31,12 @@ MIRROR_STREAM = 45
 MIRROR_SAMPLES = 4
 """Samples of unscattered glossy light a packet: they are cheap, and bright in the picture."""
 
+NARROW_BEAM = 0.05
+"""Square of the beam's width over the glossy area below which half of the samples follow the beam."""
 _SHARPEST = 1e200
+
+UNTOUCHED, DIFFUSE_LAST, GLOSSY_LAST = 0, 1, 2
+"""What light has met on the target last."""
 
 
 @device
@@ -99,12 +104,13 @@ def _vertex_value(setup: Any, point: Any, incoming: Any, on_target: Any, leaving
 
 @cached_kernel
 def next_event_walks(
-    setup: Any, latest: float, seed: Any, first: Any, count: int, picture: Any, times: Any
+    setup: Any, least: int, latest: float, seed: Any, first: Any, count: int, picture: Any, times: Any
 ) -> None:
     """Add the scores of ``count`` packets to the picture of target light.
 
     Light that goes from laser to target to aperture unscattered is left out: it has its own ways
-    (`direct_light`, `mirror_light`), and so is light that has not met the target (`backscatter_walk`).
+    (`direct_light`, `mirror_light`). Scored is light whose last meeting with the target ranks at least
+    as ``least``: `DIFFUSE_LAST` for all of it, `GLOSSY_LAST` for that of glossy surfaces.
     """
     water, target, receiver = setup.water, setup.target, setup.receiver
     mean_free_path = 1.0 / max(water.attenuation, 1e-30)
@@ -112,7 +118,7 @@ def next_event_walks(
     for i in range(count):
         history = first + np.uint64(i)
         point, direction = launch(setup.beam, seed, history)
-        weight, path, met, on_target, order = 1.0, 0.0, False, False, 0
+        weight, path, met, on_target, order = 1.0, 0.0, UNTOUCHED, False, 0
         for event in range(1, MOST_EVENTS):
             u_free, u_scatter, u_azimuth, dice = uniforms(seed, history, event, NEXT_EVENT_STREAM)
             way, exits = 1e30, False
@@ -140,14 +146,14 @@ def next_event_walks(
                 w_in = (-incoming[0], -incoming[1], incoming[2])
                 w_out, factor = sample_surface(surface, w_in, u_scatter, u_azimuth)
                 direction = (w_out[0], w_out[1], -w_out[2])
-                met = True
+                met = GLOSSY_LAST if surface.kind == MICROFACET else DIFFUSE_LAST
             else:
                 angle = 2.0 * math.pi * u_azimuth
                 deviation = sample_deviation(setup.phase, u_scatter)
                 direction = turn(incoming, deviation, math.sin(angle), math.cos(angle))
                 factor = water.albedo
                 order += 1
-            scored = order > 0 and met
+            scored = order > 0 and met >= least
             if scored:
                 u_radius, u_angle, _, _ = uniforms(seed, history, event, NEXT_EVENT_STREAM + 1)
                 leaving, distance, even = _way_to_aperture(receiver, point, u_radius, u_angle)
@@ -173,29 +179,51 @@ def next_event_walks(
                 break
 
 
+@device
+def _glossy_place(setup: Any, cells: Any, shape: Any, draws: Any, number: Any) -> Any:
+    """Draw a place of the target: evenly over the pixels that have glossy places, or in a narrow beam.
+
+    ``number`` is (number of the sample, of how many); returns the place and the inverse of its density, m².
+    """
+    target, beam = setup.target, setup.beam
+    rows, columns = shape
+    pitch_x, pitch_y = 2.0 * target.half_width / columns, 2.0 * target.half_height / rows
+    area = pitch_x * pitch_y * cells.shape[0]
+    width = math.hypot(beam.spot_sigma, target.distance * beam.divergence_sigma)
+    narrow = width * width < NARROW_BEAM * area
+    u_cell, u_choice, u_x, u_y = draws
+    cell = cells[min(int((number[0] + u_cell) / number[1] * cells.shape[0]), cells.shape[0] - 1)]
+    x = (cell % columns + u_x) * pitch_x - target.half_width
+    y = (cell // columns + u_y) * pitch_y - target.half_height
+    if not narrow:
+        return (x, y, target.distance), area
+    if u_choice < 0.5:
+        size, angle = width * math.sqrt(-2.0 * math.log(u_x)), 2.0 * math.pi * u_y
+        x, y = size * math.cos(angle), size * math.sin(angle)
+    square = (x * x + y * y) / (width * width)
+    density = 0.5 / area + 0.5 * math.exp(-0.5 * square) / (2.0 * math.pi * width * width)
+    return (x, y, target.distance), 1.0 / density
+
+
 @cached_kernel
 def mirror_light(setup: Any, cells: Any, seed: Any, first: Any, count: int, picture: Any, times: Any) -> None:
     """Add unscattered light from laser to glossy surface to aperture, `MIRROR_SAMPLES` samples a packet.
 
-    Samples are spread evenly over the pixels: a point of the pixel, a start in the laser's spot, then the two
-    ways to the aperture. ``cells`` are the pixels, row by row, that have any glossy surface.
+    Samples are spread evenly over the pixels, in part over a narrow beam: a place, a start in the laser's
+    spot, then the two ways to the aperture. ``cells`` are the pixels, row by row, that have any glossy
+    surface.
     """
     water, target, receiver = setup.water, setup.target, setup.receiver
-    rows, columns = picture.shape
-    area = 4.0 * target.half_width * target.half_height / (rows * columns)
-    area *= cells.shape[0] / MIRROR_SAMPLES
     samples = count * MIRROR_SAMPLES
     for i in range(samples):
         history = first * np.uint64(MIRROR_SAMPLES) + np.uint64(i)
-        u_cell, u_scatter, u_azimuth, _ = uniforms(seed, history, 0, MIRROR_STREAM)
-        cell = cells[min(int((i + u_cell) / samples * cells.shape[0]), cells.shape[0] - 1)]
-        row, column = cell // columns, cell % columns
+        u_cell, u_scatter, u_azimuth, u_choice = uniforms(seed, history, 0, MIRROR_STREAM)
         u_x, u_y, u_size, u_angle = uniforms(seed, history, 1, MIRROR_STREAM)
-        point = (
-            (2.0 * (column + u_x) / columns - 1.0) * target.half_width,
-            (2.0 * (row + u_y) / rows - 1.0) * target.half_height,
-            target.distance,
-        )
+        draws = (u_cell, u_choice, u_x, u_y)
+        point, area = _glossy_place(setup, cells, picture.shape, draws, (i, samples))
+        area /= MIRROR_SAMPLES
+        if abs(point[0]) >= target.half_width or abs(point[1]) >= target.half_height:
+            continue
         surface = surface_at(target, point)
         if surface.kind != MICROFACET:
             continue

@@ -25,7 +25,7 @@ TEN_TO_NINETY_PER_SIGMA = 2.0 * 1.2815515655446004
 """Rise time from 10 to 90 % of an edge whose shape is a Gaussian's integral, in standard deviations."""
 PULSE_REACH = 6.0
 """Standard deviations of the pulse after which it is over: the share beyond is 1e-9."""
-IMPULSE_BINS_PER_BIN = 8
+IMPULSE_BINS_PER_BIN, IMPULSE_BINS_PER_SIGMA, MOST_IMPULSE_BINS = 8, 8, 4000
 FOLLOWED_RETURNS = 2.0
 """Without a gate the time histogram reaches from 0 to so many times the target's return."""
 
@@ -107,8 +107,9 @@ def setup_of(scene: Scene, *, time_bins: int = 0) -> Setup:
     gate = _gate_of(scene, water.group_velocity)
     start, end = time_window(scene, gate, water.group_velocity)
     sigma = pulse_sigma(scene)
-    count = time_bins * IMPULSE_BINS_PER_BIN
     first, last = start - PULSE_REACH * sigma, end + PULSE_REACH * sigma
+    by_pulse = min(math.ceil((last - first) / sigma * IMPULSE_BINS_PER_SIGMA), MOST_IMPULSE_BINS)
+    count = max(time_bins * IMPULSE_BINS_PER_BIN, by_pulse) if time_bins else 0
     bins = TimeBins(first, (last - first) / max(count, 1), count)
     return Setup(water, phase, beam_of(scene, water.refractive_index), target, receiver, gate, bins)
 

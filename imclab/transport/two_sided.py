@@ -8,7 +8,8 @@ The picture is a sum of parts, by what the light has met on the target last:
   lit by both;
 - a glossy surface, unscattered both ways: each pixel is sampled in turn (`next_event.mirror_light`);
 - a glossy surface, scattered: walks from the camera that are reflected and joined with the beam
-  (`glossy_walk`), and the laser's image in the target seen through the water (`mirror_veil`);
+  (`glossy_walk`), and the laser's image in the target seen through the water (`mirror_veil`); where the beam
+  is narrower than the target, walks from the laser with next events (`next_event`);
 - nothing: walks from the camera joined with the beam (`backscatter_walk`).
 
 Light and camera walks meet batch by batch. Both sides of a batch are independent, so the mean of their
@@ -23,12 +24,12 @@ from numpy.typing import NDArray
 from imclab.optics.surface import MICROFACET
 from imclab.transport.backscatter_walk import backscatter_walks, way_home
 from imclab.transport.camera_walk import camera_walks
-from imclab.transport.direct_light import coverage_of, direct_light, nodes_reached, rules_for
+from imclab.transport.direct_light import coverage_of, direct_light, finer, nodes_reached, rules_for
 from imclab.transport.expected import glossy_pixels, left_out
-from imclab.transport.glossy_walk import glossy_walks, largest_roughness, mirrored_walks
+from imclab.transport.glossy_walk import glossy_walks, mirrored_walks, roughnesses
 from imclab.transport.light_walk import LightMaps, MapAxes, light_walks
 from imclab.transport.mirror_veil import mirror_veil
-from imclab.transport.next_event import mirror_light
+from imclab.transport.next_event import GLOSSY_LAST, mirror_light, next_event_walks
 from imclab.transport.picture_grid import picture_grid
 from imclab.transport.runner import Estimator, Tally
 from imclab.transport.setup import PULSE_REACH, Setup, first_return
@@ -64,7 +65,7 @@ def light_maps(
 def scattered_glossy(
     setup: Setup,
     glossy: NDArray[np.int64],
-    roughness: float,
+    roughness: tuple[float, float],
     peak: float,
     latest: float,
     run: tuple[np.uint64, np.uint64, int],
@@ -93,13 +94,13 @@ def make(setup: Setup) -> Estimator:
     latest = setup.gate.closes + PULSE_REACH * setup.gate.sigma
     axes = map_axes(setup, latest)
     reached = nodes_reached(setup, axes.times)
-    direct = direct_light(setup, rules_for(setup), coverage, axes.times, reached)
+    direct = direct_light(setup, rules_for(setup), coverage, axes.times, reached, finer(setup, grid.cells))
     exact = {"target": grid.pixels(direct.picture), "backscatter": np.zeros(grid.shape)}
     if setup.time.bins:
         exact["time"] = direct.times
     swung = collisions_swung(setup)
     table, home, glossy = gate_table(setup, axes, direct), way_home(setup, latest), glossy_pixels(setup, grid)
-    shares, roughness = gate_matrix(setup, axes), largest_roughness(setup)
+    shares, roughness = gate_matrix(setup, axes), roughnesses(setup)
     unscattered = rings_seen(setup, axes, direct, coverage)
     veil_every = 2 if np.isfinite(latest) else 1  # a gate leaves little backscatter
     returns = latest > first_return(setup)
@@ -126,7 +127,10 @@ def make(setup: Setup) -> Estimator:
             backscatter *= count / max(few, 1)
             times += veiled * (count / max(few, 1))
         if scatters and shiny:
-            scattered_glossy(setup, glossy, roughness, home.peak, latest, run, mirrored, times)
+            if swung:
+                scattered_glossy(setup, glossy, roughness, home.peak, latest, run, mirrored, times)
+            else:  # rays back from the target would seldom meet a narrow beam
+                next_event_walks(setup, GLOSSY_LAST, latest, *run, mirrored, times)
         if shiny:
             mirror_light(setup, glossy, *run, mirrored, times)
         tally = {"target": grid.pixels(cells) + mirrored, "backscatter": veil.picture(backscatter)}

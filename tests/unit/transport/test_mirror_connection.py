@@ -25,7 +25,7 @@ def test_places_are_drawn_with_the_density_that_is_stated(roughness: float) -> N
     """The mean of 1/density over drawn places is the target's area, if and only if the density is theirs."""
     setup = setup_of(scene(1.0, figure=MIRROR, side=0.2))
     draws = np.random.default_rng(3).random((400_000, 3))
-    inverse = _inverse_densities(setup, (0.03, -0.02, 0.4), roughness, draws)
+    inverse = _inverse_densities(setup, (0.03, -0.02, 0.4), (roughness, 0.02), draws)
     error = inverse.std() / np.sqrt(inverse.size)
     assert error < 0.01 * 0.04
     assert abs(inverse.mean() - 0.04) < 4.0 * error
