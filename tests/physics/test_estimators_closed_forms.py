@@ -64,7 +64,7 @@ def test_narrow_beam_in_clear_water(spot: str, pixels: int) -> None:
 
 @pytest.mark.parametrize("estimator", ["analog", "expected", "two-sided"])
 def test_few_time_bins_hold_the_energy_of_the_gate(estimator: str) -> None:
-    """Bins wider than the pulse were filled evenly before the gate was applied: 28 % were missing from one bin."""
+    """Bins wider than the pulse were filled evenly: 28 % were missing from a single one."""
     result = imclab.simulate(
         scene(1.0, gate=CENTRED), estimator=estimator, packets=20_000, seed=1, time_bins=1
     )
