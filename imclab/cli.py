@@ -23,6 +23,7 @@ from imclab.commands.study import study
 from imclab.commands.sweep import sweep
 from imclab.commands.transmit import transmit
 from imclab.commands.twin import twin
+from rig.interruption import interruptible
 
 app = typer.Typer(
     name="imclab",
@@ -80,7 +81,8 @@ def run(arguments: list[str] | None = None) -> int:
         The words after ``imclab``; those of the process when left out.
     """
     try:
-        outcome = app(args=arguments, standalone_mode=False)
+        with interruptible():  # `kill` and a batch system's time limit keep what is finished, as Ctrl-C does
+            outcome = app(args=arguments, standalone_mode=False)
     except (KeyboardInterrupt, typer.Abort):
         return _tell(KeyboardInterrupt("interrupted"), 130)
     except BrokenPipeError:

@@ -237,7 +237,7 @@ def _check_files(scene: Scene, source: str) -> None:
 
 def _read_mask(path: Path) -> NDArray[np.bool_]:
     if not path.is_file():
-        raise FileNotFoundError("no such file")
+        raise FileNotFoundError("a folder, not a picture" if path.is_dir() else "no such file")
     from skimage.io import imread
 
     try:

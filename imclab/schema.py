@@ -139,7 +139,7 @@ def _shown(value: Any) -> str:
 
 
 def _unknown_key(where: str, name: str, parent: type[BaseModel] | None) -> Fault:
-    known = sorted(parent.model_fields) if parent else []
+    known = sorted(field.alias or key for key, field in parent.model_fields.items()) if parent else []
     near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
     advice = f'Did you mean "{near[0]}"?' if near else "Remove it."
     return Fault(where, "an unknown key", f"one of {', '.join(known)}" if known else "a known key", advice)

@@ -31,10 +31,22 @@ def emit(data: Mapping[str, Any], text: str, *, as_json: bool) -> None:
     print(json.dumps(jsonable(data), indent=2) if as_json else text)
 
 
-def told(reached: Any, *, of: str = "the result") -> str:
-    """Put into words what a run's progress callback is told (`imclab.transport.runner.Reached`)."""
-    error = f"{100.0 * reached.rel_error:.3g} %" if math.isfinite(reached.rel_error) else "not known yet"
-    return f"relative error of {of} {error} after {reached.packets:.3g} packets and {reached.seconds:.1f} s"
+PREPARING = "preparing (the first run of a version compiles its kernels: some 15 s)"
+
+
+def told(reached: Any, *, of: str = "the result", goal: float | None = None) -> str:
+    """Put into words what a run's progress callback is told (`imclab.transport.runner.Reached`).
+
+    With the relative error that is wanted, ``goal``, also how long that will take: errors fall with the root of
+    time.
+    """
+    known = math.isfinite(reached.rel_error)
+    error = f"{100.0 * reached.rel_error:.3g} %" if known else "not known yet"
+    words = f"relative error of {of} {error} after {reached.packets:.3g} packets and {reached.seconds:.1f} s"
+    if goal is None or not known or reached.rel_error <= goal:
+        return words
+    left = reached.seconds * ((reached.rel_error / goal) ** 2 - 1.0)
+    return f"{words}; about {left:.2g} s more to {100.0 * goal:.3g} %"
 
 
 class Progress:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from imclab.commands.console import JSON_OPTION, Progress, emit, told
+from imclab.commands.console import JSON_OPTION, PREPARING, Progress, emit, told
 from imclab.commands.run_options import Estimator, Packets, PixelError, RelError, Seconds, Seed, Threads
 
 
@@ -41,6 +41,7 @@ def simulate(
     check_output(output)
     loaded = imclab.load_scene(scene)
     progress = Progress()
+    progress(PREPARING)
     of = "the total" if pixel_error is None else "the median pixel"
     for note in gate_beside_target(loaded, setup_of(loaded)):
         progress(f"Note: {note}.", final=True)
@@ -55,7 +56,7 @@ def simulate(
             seed=seed,
             threads=threads,
             time_bins=DEFAULT_TIME_BINS if time_bins is None else time_bins,
-            progress=lambda reached: progress(told(reached, of=of)),
+            progress=lambda reached: progress(told(reached, of=of, goal=rel_error or pixel_error)),
         )
     finally:
         progress.close()

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from imclab.commands.console import JSON_OPTION, Progress, emit, told
+from imclab.commands.console import JSON_OPTION, PREPARING, Progress, emit, told
 from imclab.commands.run_options import Packets, RelError, Seconds, Seed, Threads
 
 
@@ -36,6 +36,7 @@ def transmit(
 
     check_output(output)
     progress = Progress()
+    progress(PREPARING)
     try:
         flux = imclab.transmit(
             imclab.load_scene(scene),
@@ -45,7 +46,7 @@ def transmit(
             packets=packets,
             seed=seed,
             threads=threads,
-            progress=lambda reached: progress(told(reached)),
+            progress=lambda reached: progress(told(reached, goal=rel_error)),
         )
     finally:
         progress.close()

@@ -108,7 +108,8 @@ def test_what_the_user_can_mend_is_told_without_a_traceback(
     assert not list(tmp_path.iterdir())
 
 
-def test_ctrl_c_saves_what_was_finished(tmp_path: Path) -> None:
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_ctrl_c_and_kill_save_what_was_finished(number: int, tmp_path: Path) -> None:
     output = tmp_path / "r.h5"
     command = [sys.executable, "-m", "imclab", "simulate", str(SLIT), "-o", str(output)]
     process = subprocess.Popen(
@@ -120,9 +121,10 @@ def test_ctrl_c_saves_what_was_finished(tmp_path: Path) -> None:
         text=True,
     )
     assert process.stderr is not None
-    process.stderr.readline()  # the first line of progress: batches are being finished
+    while "packets" not in process.stderr.readline():
+        pass  # until the first line of progress: batches are being finished
     time.sleep(0.3)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(number)
     _, rest = process.communicate(timeout=60)
     assert process.returncode == 130, rest
     result = Result.load(output)
