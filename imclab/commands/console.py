@@ -37,8 +37,8 @@ PREPARING = "preparing (the first run of a version compiles its kernels: some 15
 def told(reached: Any, *, of: str = "the result", goal: float | None = None) -> str:
     """Put into words what a run's progress callback is told (`imclab.transport.runner.Reached`).
 
-    With the relative error that is wanted, ``goal``, also how long that will take: errors fall with the root of
-    time.
+    With the relative error that is wanted, ``goal``, also how long that will take: errors fall with the
+    root of time.
     """
     known = math.isfinite(reached.rel_error)
     error = f"{100.0 * reached.rel_error:.3g} %" if known else "not known yet"
