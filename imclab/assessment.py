@@ -9,19 +9,22 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from calibration import Calibration
 from imclab import similarity
-from imclab.budget import OF_THE_MEASUREMENT, sources_of
+from imclab.budget import DRAWN_INPUTS, OF_THE_MEASUREMENT, input_sources, sources_of
 from imclab.comparison import Comparison, Outcome, Pair
 from imclab.errors import Fault, InputError
 from imclab.sighting import Seen, Sighting, dark_of, see
 from imclab.uncertainty import ComparisonError, Estimate, budget, covariance, effective_dof
 
 FloatArray = NDArray[np.float64]
+
+PICTURE_BITS, STDERR_BITS = 24, 12
 
 
 def assess(
@@ -58,9 +61,15 @@ def assess(
     names = [sighting.name for sighting in sightings]
     reference = [names.index(sighting.reference) for sighting in sightings]
     sources = sources_of(seen, reference, camera, seed=seed)
+    steps = input_sources(seen, reference)
     pairs = [_pair(one, seen[reference[i]], camera) for i, one in enumerate(seen)]
     outcomes = tuple(
-        _outcome(i, seen, pairs, reference[i], budget(sources, i), camera) for i in range(len(seen))
+        replace(
+            _outcome(i, seen, pairs, reference[i], budget(sources, i), camera),
+            input_steps=budget(steps, i),
+            input_draws=len(seen[i].sighting.drawn_totals),
+        )
+        for i in range(len(seen))
     )
     return Comparison(
         title=title,
@@ -74,24 +83,30 @@ def assess(
 def _pair(seen: Seen, reference: Seen, camera: Calibration) -> Pair:
     one = seen.sighting
     through = Estimate(reference.scale, reference.scale * reference.frame_error)
-    simulated = seen.simulated * through.value
+    simulated = rounded(seen.simulated * through.value, PICTURE_BITS)
     dark = dark_of(camera, one.gain)
     return Pair(
         name=one.name,
         gain=one.gain,
         optical_depth=one.optical_depth,
         frames=len(one.counts),
-        result=one.result,
+        result=one.result.without_pictures(),
         registration=seen.registration,
-        measured=seen.energy.mean(axis=0),
-        measured_stderr=seen.stderr,
+        measured=rounded(seen.energy.mean(axis=0), PICTURE_BITS),
+        measured_stderr=rounded(seen.stderr, STDERR_BITS),
         simulated=simulated,
-        simulated_stderr=seen.simulated_stderr * through.value,
-        measured_counts=one.counts.mean(axis=0) - dark,
-        simulated_counts=camera.counts(simulated, gain=one.gain) - dark,
+        simulated_stderr=rounded(seen.simulated_stderr * through.value, STDERR_BITS),
+        measured_counts=rounded(one.counts.mean(axis=0) - dark, PICTURE_BITS),
+        simulated_counts=rounded(camera.counts(simulated, gain=one.gain) - dark, PICTURE_BITS),
         region=seen.region,
         throughput=through,
     )
+
+
+def rounded(values: FloatArray, bits: int) -> FloatArray:
+    """Return values with mantissas of so many bits: the zeros that follow take no room in a file."""
+    mantissa, exponent = np.frexp(values)
+    return np.asarray(np.ldexp(np.rint(mantissa * 2.0**bits), exponent - bits))
 
 
 def _outcome(
@@ -108,13 +123,17 @@ def _outcome(
     of_measurement = {name: shares[name] for name in OF_THE_MEASUREMENT}
     of_simulation = {name: u for name, u in shares.items() if name not in OF_THE_MEASUREMENT}
     dof = {"frame to frame": min(own.frame_dof, other.frame_dof)}
+    if own.sighting.drawn_totals:
+        dof[DRAWN_INPUTS] = len(own.sighting.drawn_totals) - 1
     return Outcome(
         pair=pairs[index],
         reference=other.sighting.name,
         measured_ratio=Estimate(
             measured, measured * math.hypot(*of_measurement.values()), effective_dof(of_measurement, dof)
         ),
-        simulated_ratio=Estimate(simulated, simulated * math.hypot(*of_simulation.values())),
+        simulated_ratio=Estimate(
+            simulated, simulated * math.hypot(*of_simulation.values()), effective_dof(of_simulation, dof)
+        ),
         error=ComparisonError(
             value=simulated / measured - 1.0, budget=shares, dof=effective_dof(shares, dof)
         ),

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -13,6 +14,23 @@ from imclab.uncertainty import Effects
 CALIBRATION_DRAWS = 200
 PIXELS_FOR_DRAWS = 4000  # enough for the mean effect of a calibration error, which is smooth in counts
 OF_THE_MEASUREMENT = ("frame to frame", "calibration", "registration")
+OF_THE_NUMBERS = ("Monte Carlo",)
+DRAWN_INPUTS = "inputs, drawn together"
+PARTS = ("u_num", "u_input", "u_D")
+
+
+def part_of(source: str) -> str:
+    """Return the part of u_val (ASME V&V 20) that a source belongs to: u_num, u_input or u_D."""
+    if source in OF_THE_MEASUREMENT:
+        return "u_D"
+    return "u_num" if source in OF_THE_NUMBERS else "u_input"
+
+
+def parts_of(shares: Mapping[str, float]) -> dict[str, float]:
+    """Gather a budget into u_num, u_input and u_D; each the root sum of squares of its sources."""
+    return {
+        part: math.hypot(*(u for source, u in shares.items() if part_of(source) == part)) for part in PARTS
+    }
 
 
 def sources_of(
@@ -36,12 +54,27 @@ def sources_of(
         "registration": _own(registration, reference),
         "calibration": _calibration_effects(seen, reference, camera, seed),
     }
+    if all(one.sighting.drawn_totals for one in seen):
+        return sources | {DRAWN_INPUTS: _drawn_effects(seen, reference)}
+    return sources | input_sources(seen, reference)
+
+
+def input_sources(seen: Sequence[Seen], reference: Sequence[int]) -> dict[str, Effects]:
+    """Return the effects of each uncertain input by itself, to first order: one step of it."""
+    sources = {}
     for key in sorted({key for one in seen for key in one.sighting.input_effects}):
         effects = [one.sighting.input_effects.get(key, (0.0, True)) for one in seen]
         change = [effect for effect, _ in effects]
         common = all(shared for _, shared in effects)
         sources[key] = _common(change, reference) if common else _own(change, reference)
     return sources
+
+
+def _drawn_effects(seen: Sequence[Seen], reference: Sequence[int]) -> Effects:
+    """Effects of all inputs together, from scenes drawn within their uncertainties (JCGM 101)."""
+    ratio = np.log(np.array([one.sighting.drawn_totals for one in seen])).T
+    ratio = ratio - ratio[:, list(reference)]
+    return np.asarray((ratio - ratio.mean(axis=0)) / np.sqrt(len(ratio) - 1))
 
 
 def _own(relative: Sequence[float], reference: Sequence[int]) -> Effects:

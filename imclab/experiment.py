@@ -19,6 +19,9 @@ from imclab.errors import Fault, InputError
 from imclab.scene import Scene, load_scene
 from imclab.schema import Part, read_toml, validate
 
+FEWEST_DRAWS = 10
+"""Below this many drawn scenes their spread says little."""
+
 
 class Condition(Part):
     """One setting of the rig and the frames taken there."""
@@ -36,11 +39,16 @@ class Condition(Part):
 
 
 class Simulation(Part):
-    """How well each condition is simulated."""
+    """How well each condition is simulated.
+
+    ``input_draws`` scenes are drawn within the experiment's ``uncertainty`` and simulated, for its
+    propagation by Monte Carlo; with none it is propagated by one step of each input.
+    """
 
     rel_error: Annotated[float, Field(gt=0, lt=1)] = 0.01
     seed: Annotated[int, Field(ge=0)] = 1
     estimator: Literal["auto", "analog", "expected", "two-sided"] = "auto"
+    input_draws: Annotated[int, Field(ge=0)] = 0
 
 
 class Experiment(Part):
@@ -72,6 +80,10 @@ class Experiment(Part):
         for reference in {self.reference, *(c.reference for c in self.condition if c.reference)}:
             if reference not in names:
                 raise ValueError(f'wanted reference to be a condition: "{reference}" is none of {names}')
+        if 0 < self.simulation.input_draws < FEWEST_DRAWS:
+            raise ValueError(f"wanted simulation.input_draws to be 0 or at least {FEWEST_DRAWS}")
+        if self.simulation.input_draws and not self.uncertainty:
+            raise ValueError("wanted an [uncertainty] to draw from, or no simulation.input_draws")
         return self
 
     def with_simulation(self, simulation: Simulation) -> Experiment:

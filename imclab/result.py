@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -93,6 +93,13 @@ class Result:
         """Relative standard error of the median pixel; infinite when nothing arrived."""
         lit = self.energy > 0.0
         return float(np.median(self.energy_stderr[lit] / self.energy[lit])) if lit.any() else float("inf")
+
+    def without_pictures(self) -> Result:
+        """Return the same numbers with empty pictures, for who keeps those elsewhere."""
+        empty = np.empty((0, 0))
+        parts = (part for name in _PICTURES for part in (name, f"{name}_stderr"))
+        pictures: dict[str, Any] = dict.fromkeys(parts, empty)
+        return replace(self, **pictures)
 
     def save(self, path: str | Path) -> None:
         """Write the result as one HDF5 file, whole or not at all."""

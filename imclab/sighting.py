@@ -35,6 +35,9 @@ class Sighting:
     input_effects : mapping of (float, bool)
         For each uncertain input: the relative change of the simulated energy when it moves by its
         standard uncertainty, and whether that error is common to all conditions.
+    drawn_totals : tuple of float
+        Simulated energy over that of ``result`` for each scene drawn within the inputs'
+        uncertainties; draw by draw the same errors in every condition. Empty without draws.
     """
 
     name: str
@@ -44,6 +47,7 @@ class Sighting:
     counts: NDArray[np.uint16]
     result: Result
     input_effects: Mapping[str, tuple[float, bool]]
+    drawn_totals: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

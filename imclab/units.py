@@ -87,8 +87,8 @@ def _finite(value: float, wanted: str) -> float:
     return value
 
 
-def sum_of(first: str, second: str) -> str:
-    """Return the sum of two quantities as text, in the unit of ``first``.
+def sum_of(first: str, second: str, *, times: float = 1.0) -> str:
+    """Return ``first + times * second`` of two quantities as text, in the unit of ``first``.
 
     Raises
     ------
@@ -97,7 +97,8 @@ def sum_of(first: str, second: str) -> str:
     """
     try:
         start = _registry().parse_expression(_plain(first))
-        total = (start + _registry().parse_expression(_plain(second))).to(start.units)
+        step = _registry().parse_expression(_plain(second))
+        total = (start + Decimal(repr(times)) * step).to(start.units)
         return f"{total.magnitude} {total.units:~C}"
     except Exception as error:  # pint raises many unrelated kinds, tokenizer errors among them
         raise UnitError(f'wanted two quantities of one kind, not "{first}" and "{second}"') from error

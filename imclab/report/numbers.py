@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from imclab.agreement import Agreement, judged
+from imclab.budget import DRAWN_INPUTS, part_of, parts_of
 from imclab.comparison import Comparison, Outcome
 from imclab.report.context import Context, Entry
 from imclab.report.detail import Both, Detail
 from imclab.sharpness import EdgeResponse
-from imclab.uncertainty import Estimate
+from imclab.uncertainty import COVERAGE_95, Estimate
 
 SYNTHETIC_LABEL = "Synthetic data: made by a virtual rig, not measured"
 
@@ -170,9 +171,18 @@ def _condition(outcome: Outcome, seen: Detail, context: Context) -> Document:
         "probability_inside": quantity(error.probability_inside, "1"),
         "bound": quantity(error.bound, "1"),
         "budget": {
-            name: {"uncertainty": quantity(u, "1"), "share": quantity(shares[name], "1")}
+            name: {
+                "uncertainty": quantity(u, "1"),
+                "share": quantity(shares[name], "1"),
+                "part": part_of(name),
+            }
             for name, u in error.budget.items()
         },
+        "parts": {
+            part: {"uncertainty": quantity(u, "1"), "share": quantity(_share(u, error.u_val), "1")}
+            for part, u in parts_of(error.budget).items()
+        },
+        "inputs": _inputs(outcome),
         "throughput": _estimate(pair.throughput),
         "metrics": _metrics(outcome.metrics),
         "degradation": {
@@ -196,6 +206,30 @@ def _condition(outcome: Outcome, seen: Detail, context: Context) -> Document:
         "notes": list(pair.result.notes),
         "scene": pair.result.scene,
     }
+
+
+def _share(u: float, whole: float) -> float:
+    return u * u / whole**2 if whole > 0 else 0.0
+
+
+def _inputs(outcome: Outcome) -> Document:
+    """Tell the scene's uncertain inputs one by one, and whether draws of all of them say the same."""
+    linear, drawn = math.hypot(*outcome.input_steps.values()), outcome.error.budget.get(DRAWN_INPUTS)
+    told: Document = {
+        "steps": {name: quantity(u, "1") for name, u in outcome.input_steps.items()},
+        "linear": quantity(linear, "1"),
+        "draws": quantity(outcome.input_draws, "1"),
+        "drawn": None,
+        "advice": "",
+    }
+    if drawn is not None:
+        scatter = drawn / math.sqrt(2.0 * (outcome.input_draws - 1))
+        told["drawn"] = quantity(drawn, "1", scatter)
+        if abs(drawn - linear) > COVERAGE_95 * scatter:
+            told["advice"] = (
+                "one step of each input does not tell the whole: the answer is not linear in them"
+            )
+    return told
 
 
 def _metrics(metrics: Mapping[str, Estimate]) -> Document:

@@ -6,9 +6,6 @@ a run that was stopped goes on where it stood.
 
 from __future__ import annotations
 
-import hashlib
-import json
-import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,18 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 import calibration
-from imclab import provenance, transport
+from imclab import provenance
 from imclab.assessment import assess
 from imclab.comparison import Comparison, Outcome
 from imclab.errors import Fault, InputError, InterruptedRunError
-from imclab.experiment import Condition, Experiment, load_experiment, read_frames
-from imclab.inputs import moved_by_its_uncertainty
+from imclab.experiment import Experiment, load_experiment, read_frames
 from imclab.report import Paths, load, render, save
 from imclab.report.background import background
+from imclab.report.simulations import Simulations
 from imclab.report.store import Store, digest_of
-from imclab.result import Result
-from imclab.sighting import Sighting
-from imclab.transport.media import water_of
 
 Progress = Callable[[str], None]
 CALIBRATION = "calibration.h5"
@@ -128,11 +122,12 @@ def run_report(
     frames = _frames(experiment, camera)
     store.keep(CALIBRATION, _calibration_key(experiment), camera.save)
     sightings = []
+    simulations = Simulations(experiment, store, threads=threads, say=say)
     for number, condition in enumerate(experiment.condition, start=1):
         label = f"{condition.name} ({number} of {len(experiment.condition)})"
         try:
             counts = frames[condition.name]
-            sightings.append(_sighting(experiment, condition, counts, store, threads, label, say))
+            sightings.append(simulations.sighting(condition, counts, label))
         except KeyboardInterrupt:
             done = f"{number - 1} of {len(experiment.condition)} pictures are kept in {store.folder}"
             raise InterruptedRunError(f"interrupted; {done}. Run the same command to go on.") from None
@@ -164,10 +159,6 @@ def render_again(folder: str | Path) -> Report:
     """
     comparison, context = load(folder)
     return Report(comparison=comparison, paths=render(comparison, folder, context=context))
-
-
-def _error(relative: float) -> str:
-    return f"{relative:.2%}" if math.isfinite(relative) else "error not known yet"
 
 
 def _calibration_key(experiment: Experiment) -> str:
@@ -216,54 +207,3 @@ def _frames(experiment: Experiment, camera: calibration.Calibration) -> dict[str
     if faults:
         raise InputError("frames", faults)
     return frames
-
-
-def _sighting(
-    experiment: Experiment,
-    condition: Condition,
-    counts: NDArray[np.uint16],
-    store: Store,
-    threads: int | None,
-    label: str,
-    say: Progress,
-) -> Sighting:
-    scene = experiment.scene_of(condition)
-    how = experiment.simulation
-
-    def simulated(name: str, scene: Any, **until: Any) -> Result:
-        mask = hashlib.sha256(np.packbits(scene.figure_mask).tobytes()).hexdigest()
-        key = digest_of(scene.toml, mask, how.estimator, str(how.seed), json.dumps(until, sort_keys=True))
-        file = store.folder / f"{name}.h5"
-        if store.holds(file.name, key):
-            return Result.load(file)
-        say(f"simulating {label}")
-        result = transport.simulate(
-            scene,
-            seed=how.seed,
-            estimator=how.estimator,
-            threads=threads,
-            progress=lambda at: say(f"simulating {label}: {_error(at.rel_error)} after {at.seconds:.1f} s"),
-            **until,
-        )
-        if result.interrupted:
-            raise KeyboardInterrupt
-        store.keep(file.name, key, result.save)
-        return result
-
-    result = simulated(condition.name, scene, rel_error=how.rel_error)
-    effects = {}
-    for index, (dotted, spread) in enumerate(sorted(experiment.uncertainty.items()), start=1):
-        moved = moved_by_its_uncertainty(scene, dotted, spread)
-        # The same histories again: what they share cancels in the difference.
-        other = simulated(f"{condition.name}-input{index}", moved, packets=result.packets)
-        common = all(dotted not in each.scene_changes for each in experiment.condition)
-        effects[dotted] = (other.total / result.total - 1.0, common)
-    return Sighting(
-        name=condition.name,
-        reference=experiment.reference_of(condition).name,
-        gain=condition.gain,
-        optical_depth=water_of(scene)[0].attenuation * scene.target.distance,
-        counts=counts,
-        result=result,
-        input_effects=effects,
-    )

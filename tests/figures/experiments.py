@@ -41,6 +41,8 @@ class Trial:
     ratio_inside: bool
     agrees: bool
     flagged: bool
+    deviation: float
+    """Of the measured ratio from the true one, in stated standard uncertainties."""
 
 
 def trial(seed: int) -> Trial:
@@ -67,6 +69,7 @@ def trial(seed: int) -> Trial:
             ratio_inside=low <= true <= high,
             agrees=right.error.verdict.startswith("agrees"),
             flagged=not wrong.error.verdict.startswith("agrees"),
+            deviation=(right.measured_ratio.value - true) / right.measured_ratio.stderr,
         )
 
 
@@ -111,6 +114,8 @@ def main() -> None:
     ):
         share = float(np.mean(hits))
         print(f"{name}: {share:.3f} +- {np.sqrt(share * (1 - share) / count):.3f} of {count}")
+    off = np.array([t.deviation for t in done])
+    print(f"deviation in stated uncertainties: mean {off.mean():+.2f}, spread {off.std(ddof=1):.2f}")
 
 
 if __name__ == "__main__":

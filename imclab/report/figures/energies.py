@@ -24,9 +24,22 @@ from imclab.uncertainty import coverage_factor
 
 
 def energy_curve(comparison: Comparison) -> Figure:
-    """Energy ratio against optical depth, and the relative error below with the bound."""
-    figure, axes = new_figure(5.2, 4.8, 2, 1, margins=Margins(down=0.12), sharex=True, height_ratios=(3, 2))
-    upper, lower = axes[:, 0]
+    """Energy ratio against optical depth, and the relative error below with the bound.
+
+    Errors that are small beside the bound are shown once more below, on their own scale.
+    """
+    bound = max((outcome.error.bound for outcome in comparison.outcomes), default=0.3)
+    twice = 0.0 < _largest(comparison) < bound / 3
+    figure, axes = new_figure(
+        5.2,
+        6.2 if twice else 4.8,
+        3 if twice else 2,
+        1,
+        margins=Margins(down=0.16),
+        sharex=True,
+        height_ratios=(3, 2, 2)[: 3 if twice else 2],
+    )
+    upper = axes[0, 0]
     for index, (reference, group) in enumerate(_groups(comparison).items()):
         depth = np.array([outcome.pair.optical_depth for outcome in group])
         marker = MARKERS[index % len(MARKERS)]
@@ -38,35 +51,44 @@ def energy_curve(comparison: Comparison) -> Figure:
             ratio = [getattr(outcome, which) for outcome in group]
             label = f"{which.split('_')[0]}, {reference}"
             _points(upper, depth + shift + offset, ratio, color=colour, marker=marker, mfc=fill, label=label)
-        lower.errorbar(
-            depth + shift,
-            [100 * outcome.error.value for outcome in group],
-            [100 * coverage_factor(outcome.error.dof) * outcome.error.u_val for outcome in group],
-            fmt=marker,
-            color=SIMULATED,
-            markersize=5,
-            elinewidth=1.1,
-            label=f"relative to {reference}",
-        )
+        for lower in axes[1:, 0]:
+            lower.errorbar(
+                depth + shift,
+                [100 * outcome.error.value for outcome in group],
+                [100 * _half_interval(outcome) for outcome in group],
+                fmt=marker,
+                color=SIMULATED,
+                markersize=5,
+                elinewidth=1.1,
+            )
     upper.set_yscale("log")
     plain_numbers(upper.yaxis)
     upper.set_ylabel("energy over that of the reference")
     upper.legend(loc="lower left")
-    bound = 100 * max((outcome.error.bound for outcome in comparison.outcomes), default=0.3)
-    lower.axhline(0, color=MEASURED, linewidth=0.8)
-    for side in (-bound, bound):
-        lower.axhline(side, color=BOUND, linewidth=1.0, linestyle=(0, (5, 3)))
-    lower.annotate(
-        f"±{bound:.0f} %",
-        (1.0, bound),
-        xycoords=("axes fraction", "data"),
-        ha="right",
-        va="bottom",
-        color=BOUND,
-    )
-    lower.set_ylabel("relative error / %")
-    lower.set_xlabel("optical depth (attenuation × distance, one way)")
+    _mark_bound(axes[1, 0], 100 * bound)
+    for lower in axes[1:, 0]:
+        lower.axhline(0, color=MEASURED, linewidth=0.8)
+        lower.set_ylabel("relative error / %")
+    if twice:
+        axes[2, 0].set_ylabel("the same, enlarged / %")
+    axes[-1, 0].set_xlabel("optical depth (attenuation × distance, one way)")
     return figure
+
+
+def _half_interval(outcome: Outcome) -> float:
+    return coverage_factor(outcome.error.dof) * outcome.error.u_val
+
+
+def _largest(comparison: Comparison) -> float:
+    """Farthest end of a 95 % interval from no error."""
+    return max((abs(each.error.value) + _half_interval(each) for each in judged(comparison)), default=0.0)
+
+
+def _mark_bound(plot: Any, percent: float) -> None:
+    for side in (-percent, percent):
+        plot.axhline(side, color=BOUND, linewidth=1.0, linestyle=(0, (5, 3)))
+    place = {"xycoords": ("axes fraction", "data"), "ha": "right", "va": "top", "color": BOUND}
+    plot.annotate(f"±{percent:.0f} %", (1.0, 0.95 * percent), **place)
 
 
 def bland_altman(comparison: Comparison, agreement: Agreement) -> Figure:
@@ -97,9 +119,9 @@ def bland_altman(comparison: Comparison, agreement: Agreement) -> Figure:
             plot.axhline(100 * level, color=BOUND, linewidth=1.0, linestyle=style)
             plot.annotate(
                 name,
-                (1.0, 100 * level),
+                (0.01, 100 * level),
                 xycoords=("axes fraction", "data"),
-                ha="right",
+                ha="left",
                 va="bottom",
                 color=BOUND,
             )

@@ -40,7 +40,6 @@ def sharpness(outcome: Outcome, seen: Detail) -> Figure:
         plot.set_title(name)
         plot.set_xlabel("camera pixel")
     axes[0, 0].set_ylabel("energy per pixel / white")
-    axes[0, 0].legend(loc="upper right")
     plot = axes[0, 2]
     plot.set_title("slanted edge")
     if seen.edge is None:
@@ -57,6 +56,8 @@ def sharpness(outcome: Outcome, seen: Detail) -> Figure:
     plot.set_ylim(0, 1.1)
     plot.set_xlabel("cycles per pixel")
     plot.set_ylabel("modulation transfer")
+    # Here the curves fall, and leave room.
+    plot.legend(*axes[0, 0].get_legend_handles_labels(), loc="upper right")
     return figure
 
 
