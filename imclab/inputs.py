@@ -56,8 +56,9 @@ def moved_together(scene: Scene, spreads: Spreads, steps: Sequence[float] | NDAr
 def joint_steps(common: Sequence[bool], *, conditions: int, draws: int, seed: int) -> NDArray[np.float64]:
     """Draw how many standard uncertainties each input is off, for Monte Carlo propagation (JCGM 101).
 
-    Normal and independent, as a Latin hypercube: every draw takes another one of ``draws`` equally
-    probable slices of each input, so that few draws suffice where the answer is nearly linear.
+    Normal and independent, as a centred Latin hypercube: every draw takes the middle of another one of
+    ``draws`` equally probable slices of each input, in random order. Their spread is within 1.2 % of
+    the normal law's from ten draws on, where ten plain draws are wrong by a quarter.
 
     Parameters
     ----------
@@ -72,8 +73,12 @@ def joint_steps(common: Sequence[bool], *, conditions: int, draws: int, seed: in
     from scipy.stats import qmc
 
     shared = np.asarray(common, dtype=bool)
+    if draws == 0:
+        return np.empty((0, conditions, shared.size))
     own = int((~shared).sum())
-    sampler = qmc.LatinHypercube(d=int(shared.sum()) + own * conditions, rng=np.random.default_rng(seed))
+    sampler = qmc.LatinHypercube(
+        d=int(shared.sum()) + own * conditions, scramble=False, rng=np.random.default_rng(seed)
+    )
     normal = ndtri(sampler.random(draws))
     steps = np.empty((draws, conditions, shared.size))
     steps[:, :, shared] = normal[:, np.newaxis, : shared.sum()]

@@ -50,6 +50,18 @@ def test_page_is_whole_at_every_width(browser: Tab, folder: Path, width: int, sc
     assert browser.requests() == [(folder / "report.html").resolve().as_uri()]
 
 
+@pytest.mark.parametrize("spoiled", [False, True])
+def test_the_verdict_needs_no_scrolling_on_a_desktop(
+    browser: Tab, folder: Path, tmp_path: Path, spoiled: bool
+) -> None:
+    page = tmp_path / "page.html"
+    text = (folder / "report.html").read_text(encoding="utf-8")
+    page.write_text(text.replace("Error ± u</th>", "Error " + 60 * "u" + "</th>") if spoiled else text)
+    browser.open(page, width=1280)
+    hidden = "(box => box.scrollWidth - box.clientWidth)(document.querySelector('main .scroll'))"
+    assert (browser.run(hidden) > 0) == spoiled
+
+
 def test_the_width_test_would_notice(browser: Tab, folder: Path, tmp_path: Path) -> None:
     page = (folder / "report.html").read_text(encoding="utf-8")
     wide = tmp_path / "wide.html"

@@ -59,6 +59,7 @@ def test_leaves_the_files_it_promises(made: tuple[Path, dict[str, Any]]) -> None
     numbers = json.loads((folder / "report.json").read_text(encoding="utf-8"))
     assert numbers["synthetic"] is True
     assert (folder / "report.html").stat().st_size < 3e6
+    assert (folder / "comparison.h5").stat().st_size < 5e6
 
 
 def test_energy_ratios_hold_the_truth_in_their_95_percent_intervals(

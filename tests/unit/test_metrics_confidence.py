@@ -4,6 +4,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from scipy.stats import bootstrap
 
 from imclab import metrics
 from imclab.errors import ImclabError
@@ -64,3 +65,19 @@ def test_equal_frames_give_a_point():
 def test_what_cannot_be_an_interval_is_refused(call, wanted):
     with pytest.raises(ImclabError, match=wanted):
         call()
+
+
+def test_ten_frames_are_enough_for_an_honest_interval():
+    """400 means of ten normal numbers: 90 to 99 % within; plain BCa holds 87 % (power)."""
+    rng = np.random.default_rng(4)
+    widened = plain = 0
+    for seed in range(400):
+        values = rng.standard_normal(10)
+        found = metrics.confidence_from_frames(
+            lambda _, frame: float(frame), 0.0, values, resamples=999, seed=seed
+        )
+        widened += found.low <= 0 <= found.high
+        narrow = bootstrap((values,), np.mean, n_resamples=499, method="BCa", rng=seed).confidence_interval
+        plain += narrow.low <= 0 <= narrow.high
+    assert 360 <= widened <= 396
+    assert plain < 360

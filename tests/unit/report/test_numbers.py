@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from imclab.agreement import agreement
+from imclab.budget import DRAWN_INPUTS
 from imclab.comparison import Comparison
 from imclab.report.detail import detail
 from imclab.report.numbers import document, quantity
@@ -97,3 +98,26 @@ def test_a_frame_that_was_not_registered_is_said_first(made: Comparison) -> None
     assert numbers["conditions"][1]["verdict"] == "not registered"
     assert numbers["verdict"]["text"].endswith("1 condition could not be registered.")
     assert numbers["verdict"]["agreeing"]["value"] == 1
+
+
+def test_parts_of_the_budget_sum_to_one(made: Comparison) -> None:
+    for told in numbers_of(made)["conditions"]:
+        shares = [part["share"]["value"] for part in told["parts"].values()]
+        assert sum(shares) == pytest.approx(0.0 if told["is_reference"] else 1.0)
+
+
+@pytest.mark.parametrize(("drawn", "differs"), [(0.031, False), (0.06, True)])
+def test_draws_that_differ_from_single_steps_are_told(made: Comparison, drawn: float, differs: bool) -> None:
+    first = made.outcomes[1]
+    kept = {"Monte Carlo": 0.01, DRAWN_INPUTS: drawn}
+    outcome = dataclasses.replace(
+        first,
+        error=dataclasses.replace(first.error, budget=kept),
+        input_steps={"medium.attenuation": 0.03},
+        input_draws=20,
+    )
+    changed = dataclasses.replace(made, outcomes=(made.outcomes[0], outcome, *made.outcomes[2:]))
+    told = numbers_of(changed)["conditions"][1]["inputs"]
+    assert told["draws"]["value"] == 20
+    assert told["drawn"]["value"] == drawn
+    assert bool(told["advice"]) == differs
