@@ -139,6 +139,7 @@ def _outcome(
         ),
         metrics=_agreement(own, pairs[index], camera),
         degradation=_degradation(own, other, pairs[index], pairs[reference], camera),
+        noisy_degradation=_noisy_degradation(own, other, pairs[index], pairs[reference], camera),
     )
 
 
@@ -177,7 +178,9 @@ def _degradation(
         of_measurement = similarity.mean_of(scores)
     else:
         drawn = zip(
-            _frames_from_noise(other, reference, camera), _frames_from_noise(own, pair, camera), strict=True
+            _frames_from_noise(other, reference, camera, seed=1),
+            _frames_from_noise(own, pair, camera),
+            strict=True,
         )
         of_measurement = similarity.single(scores, _scores(drawn, region, camera))
     return {name: (of_simulation[name], of_measurement[name]) for name in scores}
@@ -193,8 +196,27 @@ def _frames_above_dark(seen: Seen, camera: Calibration) -> FloatArray:
     return np.asarray(seen.sighting.counts - dark_of(camera, seen.sighting.gain))
 
 
-def _frames_from_noise(seen: Seen, pair: Pair, camera: Calibration) -> list[FloatArray]:
-    rng = np.random.default_rng(0)
+def _noisy_degradation(
+    own: Seen, other: Seen, pair: Pair, reference: Pair, camera: Calibration
+) -> dict[str, Estimate]:
+    """Metrics of the simulation against its reference, both with the camera's noise of one frame."""
+    if own is other:
+        return {}
+    pictures = [
+        _with_camera_noise(one, _frames_from_noise(seen, one, camera, seed=seed))
+        for seed, (seen, one) in enumerate(((other, reference), (own, pair)), start=1)
+    ]
+    return similarity.mean_of(_scores(zip(*pictures, strict=True), pair.region & reference.region, camera))
+
+
+def _with_camera_noise(pair: Pair, drawn: Sequence[FloatArray]) -> list[FloatArray]:
+    """Add what frames of noise scatter about their mean: drawing spreads light once more than it should."""
+    mean, few = np.mean(drawn, axis=0), math.sqrt(len(drawn) / (len(drawn) - 1))
+    return [pair.simulated_counts + few * (frame - mean) for frame in drawn]
+
+
+def _frames_from_noise(seen: Seen, pair: Pair, camera: Calibration, *, seed: int = 0) -> list[FloatArray]:
+    rng = np.random.default_rng(seed)
     dark = dark_of(camera, pair.gain)
     return [
         camera.draw(pair.simulated, gain=pair.gain, rng=rng) - dark for _ in range(similarity.NOISE_DRAWS)

@@ -85,6 +85,14 @@ class Outcome:
     degradation : mapping of (simulated Estimate, measured Estimate)
         The same metrics of this condition against its reference condition, within the simulation
         and within the measurement: the paper's table 1.
+    noisy_degradation : mapping of Estimate
+        The same within the simulation after the camera's noise of one frame is put on both pictures:
+        what the measured metrics should be.
+    input_steps : mapping of float
+        Relative standard uncertainty from each uncertain input of the scene by itself, from one step
+        of it. These are in the budget of ``error``, unless scenes were drawn.
+    input_draws : int
+        How many scenes were drawn within those uncertainties; their spread is then in the budget.
     """
 
     pair: Pair
@@ -94,6 +102,7 @@ class Outcome:
     error: ComparisonError
     metrics: Mapping[str, Estimate]
     degradation: Mapping[str, tuple[Estimate, Estimate]]
+    noisy_degradation: Mapping[str, Estimate] = field(default_factory=dict)
     input_steps: Mapping[str, float] = field(default_factory=dict)
     input_draws: int = 0
 

@@ -187,6 +187,7 @@ def _condition(outcome: Outcome, seen: Detail, context: Context) -> Document:
         "metrics": _metrics(outcome.metrics),
         "degradation": {
             "simulated": _metrics({name: both[0] for name, both in outcome.degradation.items()}),
+            "with noise": _metrics(outcome.noisy_degradation),
             "measured": _metrics({name: both[1] for name, both in outcome.degradation.items()}),
         },
         "speed": _speed(outcome),

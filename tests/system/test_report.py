@@ -78,6 +78,21 @@ def test_energy_ratios_hold_the_truth_in_their_95_percent_intervals(
         assert condition["verdict"] == "agrees within its uncertainty"
 
 
+def test_the_water_does_to_the_simulation_what_it_does_to_the_measurement(
+    made: tuple[Path, dict[str, Any]],
+) -> None:
+    numbers = json.loads((made[0] / "report.json").read_text(encoding="utf-8"))
+    for condition in numbers["conditions"]:
+        if condition["is_reference"]:
+            continue
+        clean, noisy, measured = (
+            condition["degradation"][name]["mssim"]["value"]
+            for name in ("simulated", "with noise", "measured")
+        )
+        assert noisy == pytest.approx(measured, abs=0.01), condition["name"]
+        assert clean != pytest.approx(measured, abs=0.01), condition["name"]  # noise is what differs
+
+
 def test_registration_finds_the_mount_within_a_fifth_of_a_pixel(
     made: tuple[Path, dict[str, Any]], truth: dict[str, Any]
 ) -> None:

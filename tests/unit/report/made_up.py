@@ -218,4 +218,5 @@ def _outcome(pair: Pair, reference: str, error: float, shares: dict[str, float])
         error=ComparisonError(value=error, budget=shares),
         metrics=metrics,
         degradation={} if own else degradation,
+        noisy_degradation={} if own else {name: both[1] for name, both in degradation.items()},
     )
