@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from imclab.comparison import Comparison
+from imclab.comparison import Comparison, Outcome
 from imclab.errors import OutputError
 from imclab.report import Context, load, render, save
 from tests.unit.report import made_up
@@ -145,3 +145,18 @@ def test_a_folder_that_cannot_be_written_to_is_told(made: Comparison, tmp_path: 
     with pytest.raises(OutputError, match="cannot be written"):
         render(made, tmp_path, context=Context())
     assert not (tmp_path / "report.html").exists()
+
+
+def test_inputs_that_were_not_stated_are_not_called_zero(made: Comparison, tmp_path: Path) -> None:
+    def without(outcome: Outcome) -> Outcome:
+        kept = {name: u for name, u in outcome.error.budget.items() if name != "medium.attenuation"}
+        return dataclasses.replace(outcome, error=dataclasses.replace(outcome.error, budget=kept))
+
+    for comparison, says in (
+        (made, False),
+        (dataclasses.replace(made, outcomes=tuple(map(without, made.outcomes))), True),
+    ):
+        render(comparison, tmp_path, context=made_up.context())
+        page = (tmp_path / "report.html").read_text(encoding="utf-8")
+        assert ("u_input is missing, not zero" in page) == says
+        assert ("<td>not stated</td>" in page) == says
