@@ -116,7 +116,7 @@ def run_report(
     if rel_error is not None:
         changed = experiment.simulation.model_copy(update={"rel_error": rel_error})
         experiment = experiment.with_simulation(changed)
-    store = Store(Path(folder))
+    store = Store(Path(folder), experiment.title)
     say("calibration")
     camera = _camera(experiment, store)
     frames = _frames(experiment, camera)

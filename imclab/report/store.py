@@ -17,16 +17,22 @@ LEDGER = "inputs.json"
 class Store:
     """A folder of finished files that a later run with the same inputs need not make again.
 
+    Parameters
+    ----------
+    folder : Path
+    title : str
+        Title of the experiment: the report of another one in the same folder is not written over.
+
     Raises
     ------
     InputError
-        When the folder is a file, or holds files that no earlier report left.
+        When the folder is a file, or holds the report of another experiment or other files.
     OutputError
         When it cannot be made.
     """
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    def __init__(self, folder: Path, title: str) -> None:
+        self.folder, self._title = folder, title
         self._ledger_path = folder / LEDGER
         if folder.exists() and not folder.is_dir():
             raise InputError(str(folder), [Fault("output", "a file", "a folder")])
@@ -38,7 +44,15 @@ class Store:
         self._used: set[str] = set()
         self._ledger: dict[str, str] = {}
         if self._ledger_path.is_file():
-            self._ledger = json.loads(self._ledger_path.read_text(encoding="utf-8"))
+            kept = json.loads(self._ledger_path.read_text(encoding="utf-8"))
+            self._ledger = kept["files"]
+            if kept["experiment"] != title:
+                advice = "Name another folder, or remove this one first."
+                came, wanted = (
+                    f'the report of "{kept["experiment"]}"',
+                    f'a folder for the report of "{title}"',
+                )
+                raise InputError(str(folder), [Fault("output", came, wanted, advice)])
 
     def holds(self, name: str, key: str) -> bool:
         """Tell whether the file ``name`` is there and was made from the inputs that ``key`` names."""
@@ -69,7 +83,8 @@ class Store:
 
     def _write(self) -> None:
         with written_whole(self._ledger_path) as temporary:
-            temporary.write_text(json.dumps(self._ledger, indent=2, sort_keys=True) + "\n", encoding="utf-8")
+            kept = {"experiment": self._title, "files": self._ledger}
+            temporary.write_text(json.dumps(kept, indent=2, sort_keys=True) + "\n", encoding="utf-8")
 
 
 def digest_of(*parts: str) -> str:

@@ -30,7 +30,7 @@ def uncertain(**spreads: str | float) -> Experiment:
 
 
 def sightings(experiment: Experiment, folder: Path) -> list[Sighting]:
-    made = Simulations(experiment, Store(folder), threads=1, say=lambda text: None)
+    made = Simulations(experiment, Store(folder, "rig"), threads=1, say=lambda text: None)
     return [made.sighting(condition, COUNTS, "") for condition in experiment.condition]
 
 
@@ -84,4 +84,4 @@ def test_what_is_kept_is_not_simulated_again(tmp_path: Path, monkeypatch: pytest
 
 def test_a_draw_that_makes_no_scene_is_told_before_anything_is_simulated(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="albedo"):
-        Simulations(uncertain(medium__albedo=0.3), Store(tmp_path), threads=1, say=lambda text: None)
+        Simulations(uncertain(medium__albedo=0.3), Store(tmp_path, "rig"), threads=1, say=lambda text: None)
