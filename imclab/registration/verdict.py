@@ -1,9 +1,9 @@
 """From a fit to a result: how sure it is, and whether to believe it.
 
 A rich model of the appearance can imitate a spot, fringes or another target, so what it explains
-decides nothing. Four things together do: the picture itself, with one amplitude, must explain most
-of the structure on coarse pixels; it must stand out of the noise; the motion must be sharp; and the
-blur must leave something to recognise.
+decides nothing. Five things together do: the picture itself, with one amplitude, must explain most
+of the structure on coarse pixels; it must stand out of the noise; the motion must be sharp; the
+blur must leave something to recognise; and half of the target must be inside the frame.
 """
 
 from __future__ import annotations
@@ -28,6 +28,9 @@ _LARGEST_STDERR = 0.04
 """At the target, of its radius: with the target 0.031 and less, in 1000 pairs."""
 _LARGEST_BLUR = 0.16
 """Of the target's radius: with the target 0.124 and less; a spot that passed by the rest had 0.19."""
+
+_LEAST_SHOWN = 0.5
+"""Share of the target inside the frame: part of a target, blown up and blurred, passed for a beam spot."""
 
 
 class Found(NamedTuple):
@@ -64,7 +67,8 @@ def judged(reference: Reference, found: Found, coarse: Pixels, noise: float, sha
     quality = likeness(reference, coarse, fitted.state, noise)
     blur = float(np.sqrt(max(fitted.state.blur, 0.0)))
     relative = at_target / (frame.radius * magnification(matrix))
-    reason = _doubt(quality, contrast, relative, blur / frame.radius)
+    shown = _share_inside(matrix, figure, shapes[1])
+    reason = _doubt(quality, contrast, relative, blur / frame.radius, shown)
     return Registration(
         matrix=_frozen(matrix),
         model=found.name,
@@ -104,7 +108,16 @@ def nothing(reason: str, model: str, shapes: Shapes) -> Registration:
     )
 
 
-def _doubt(quality: float, contrast: float, stderr: float, blur: float) -> str:
+def _share_inside(matrix: Matrix, points: NDArray[np.float64], shape: tuple[int, ...]) -> float:
+    """Return the share of points (n, 2) that a motion leaves inside a frame."""
+    moved = np.column_stack([points, np.ones(len(points))]) @ matrix.T
+    in_front = moved[:, 2] > 0.0
+    at = moved[:, :2] / np.where(in_front, moved[:, 2], 1.0)[:, None]
+    inside = in_front & np.all((at >= 0.0) & (at <= [shape[1] - 1, shape[0] - 1]), axis=1)
+    return float(np.mean(inside))
+
+
+def _doubt(quality: float, contrast: float, stderr: float, blur: float, shown: float) -> str:
     """Say why a fit is not believed; empty when it is. Stderr and blur in target radii."""
     doubts = []
     if quality < _LEAST_QUALITY:
@@ -115,6 +128,8 @@ def _doubt(quality: float, contrast: float, stderr: float, blur: float) -> str:
         doubts.append(f"its place is uncertain by {stderr:.3f} of its radius (most {_LARGEST_STDERR})")
     if blur > _LARGEST_BLUR:
         doubts.append(f"the blur is {blur:.2f} of its radius (most {_LARGEST_BLUR})")
+    if shown < _LEAST_SHOWN:
+        doubts.append(f"only {shown:.2f} of it would be inside the frame (least {_LEAST_SHOWN})")
     return f"the frame does not show the target: {', '.join(doubts)}" if doubts else ""
 
 

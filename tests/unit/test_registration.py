@@ -45,6 +45,15 @@ def test_refuses_frames_without_the_target(kind):
     assert "does not show the target" in found.reason
 
 
+def test_refuses_a_part_of_the_target_blown_up_to_a_spot():
+    """Bars 2.7 times as large and blurred, most of them outside the frame, explained a beam spot to 96 %."""
+    pair = make_pair(52010, band="small", target="bars")
+    found = register(pair.fixed, decoy_frames(52010)["beam spot"], model="homography")
+    assert not found.ok
+    assert "inside the frame" in found.reason
+    assert register(pair.fixed, pair.moving, model="homography").ok  # power: the target itself
+
+
 @pytest.mark.parametrize(
     ("seed", "other", "band", "snr_db"), [(313, 314, "homography", 5), (320, 322, "large", 40)]
 )
