@@ -157,7 +157,7 @@ def _enter(tally: Any, tents: bool, seen: Any, energy: Any) -> None:
 
 
 @device
-def _way_out(target: Any, point: Any, direction: Any) -> Any:
+def way_out(target: Any, point: Any, direction: Any) -> Any:
     """Return how far a ray goes to the target's plane or to the water's surface."""
     if direction[2] > 0.0:
         return (target.distance - point[2]) / direction[2]
@@ -201,7 +201,7 @@ def backscatter_walks(
             joined = copy > 0  # a copy goes on after the join that it was made at
             while weight > 0.0 and path <= farthest and event < MOST_EVENTS:
                 numbers = (seed, history, event, BACKSCATTER_STREAM + STREAMS_OF_A_COPY * copy)
-                length = _way_out(target, point, direction)
+                length = way_out(target, point, direction)
                 if not joined:
                     stretch = (length, path, weight)
                     energy, arrival = join(setup, point, direction, stretch, _join_draws(numbers, even))

@@ -16,7 +16,7 @@ import numpy as np
 
 from imclab.optics.surface import MICROFACET
 from imclab.transport.analog import surface_at
-from imclab.transport.backscatter_walk import line_of_sight, new_direction
+from imclab.transport.backscatter_walk import line_of_sight, new_direction, way_out
 from imclab.transport.beam_field import beam_irradiance
 from imclab.transport.beam_join import deviation_of, join
 from imclab.transport.even_points import advance, coordinate, first_point
@@ -77,14 +77,6 @@ def _lit_directly(setup: Any, point: Any, surface: Any, u0: Any, u1: Any) -> Any
 
 
 @device
-def _way_to_edge(target: Any, point: Any, direction: Any) -> Any:
-    """Return how far a ray goes to the target's plane or to the water's surface."""
-    if direction[2] > 0.0:
-        return (target.distance - point[2]) / direction[2]
-    return -point[2] / direction[2] if direction[2] < 0.0 else 1e30
-
-
-@device
 def _follow(setup: Any, way_of: Any, numbers: Any, even: Any, start: Any, picture: Any, times: Any) -> None:
     """Follow a walk from the camera to its end and enter what it brings into its pixel.
 
@@ -97,7 +89,7 @@ def _follow(setup: Any, way_of: Any, numbers: Any, even: Any, start: Any, pictur
     point, direction, weight, free, pixel = start
     farthest, mean_free_path = latest * water.group_velocity, 1.0 / max(water.attenuation, 1e-30)
     met, path, kept = False, 0.0, 1.0
-    way = _way_to_edge(target, point, direction)
+    way = way_out(target, point, direction)
     for event in range(1, MOST_EVENTS):
         on_target = free >= way and direction[2] > 0.0
         if free >= way and not on_target:
@@ -151,7 +143,7 @@ def _follow(setup: Any, way_of: Any, numbers: Any, even: Any, start: Any, pictur
                 break
             weight /= ROULETTE_CHANCE
             kept /= ROULETTE_CHANCE
-        way = _way_to_edge(target, point, direction)
+        way = way_out(target, point, direction)
         if met:
             draws = (u_place, u_start, u_around)
             energy, arrival = join(setup, point, direction, (way, path, weight), draws)
